@@ -321,8 +321,11 @@ class Assigner {
     for (std::size_t t = 0; t < log_.topics.size(); ++t) {
       const RawTopic& topic = log_.topics[t];
       for (std::size_t c = 0; c < topic.columns.size() && topic.time_s.size() > 8; ++c) {
-        const IndexKind kind = read_name(topic.columns[c].name).kind;
-        if (kind != IndexKind::kNone && kind != IndexKind::kNumber) continue;
+        const NameReading name = read_name(topic.columns[c].name);
+        const bool is_named = *std::max_element(name.bits.begin(), name.bits.end()) > kLikelyName;
+        if (is_named && is_plain_table(log_, topic) && !holds_numbers(topic.columns[c].values))
+          found_.rejected.push_back(topic.columns[c].name + ": it holds no number");
+        if (name.kind != IndexKind::kNone && name.kind != IndexKind::kNumber) continue;
         if (correlation_of(topic.time_s, topic.columns[c].values) > 0.9999) taken_[t][c] = 1;
       }
     }
@@ -433,7 +436,7 @@ class Assigner {
     constexpr double kBeyondDoubt = 2 * kClear_bits;
     for (Carried& carried : found_.groups) {
       if (carried.signal != shown.carried.signal || lead_bits < kBeyondDoubt) continue;
-      found_.corrected.push_back(
+      found_.decided.push_back(
           fmt::format("{}: {}, as the motion shows, and not what the name says ({:.0f} bits)",
                       names_of(log_, carried), shown.words, lead_bits));
       carried = shown.carried;
@@ -474,15 +477,27 @@ class Assigner {
   }
 
   void assign_motors() {
-    if (known({kDuty, kRequested, kMotorCommand, kRotorSpeed, kMotorForce}) != nullptr) return;
+    if (known(kRotorSignals) != nullptr) return;
     const ColumnGroup* const group = likeliest(kIsMotors, 4);
     if (group == nullptr) return;
     const auto [low, high] = range_of(*group);
     if (!std::isnan(low) && !(low >= 0 && high < 65536)) return;
     const ColumnGroup driven = without_idle(*group);
-    if (driven.columns.size() == 4) add({kDuty, driven.topic, driven.columns, "", 1, 1, Ask::kMotors});
-    const double scale = high <= 1.001 ? 1 : high <= 100 ? 100 : high <= 1000 ? 1000 : 65536;
-    if (driven.columns.size() > 4) add({kMotorCommand, driven.topic, driven.columns, "1", 1, scale});
+    if (driven.columns.size() < 4) return;
+    const bool is_pulse = high > 800 && high < 2500;
+    const std::string unit = is_pulse       ? "us"
+                             : high <= 1.5  ? "1"
+                             : high <= 100  ? "%"
+                             : high <= 255  ? "1/255"
+                             : high <= 1000 ? "permille"
+                                            : "PWM";
+    const int signal = driven.columns.size() == 4 && !is_pulse ? kDuty : kMotorCommand;
+    const UnitFactor factor = *unit_factor(signal, unit);
+    Carried carried{signal, driven.topic, driven.columns, unit, factor.multiply, factor.divide};
+    carried.offset = factor.offset;
+    found_.decided.push_back(
+        fmt::format("{}: read as commands of motors in {}, by their range", names_of(log_, carried), unit));
+    add(std::move(carried));
   }
 
   void assign_battery() {
@@ -530,6 +545,8 @@ class Assigner {
       if (group.kind == IndexKind::kNone || group.columns.size() < 3 || !is_free(group) ||
           knots_.time_s.empty())
         continue;
+      if (group.kind == IndexKind::kNumber && group.bits[kIsMotors] > 0 && known(kRotorSignals) == nullptr)
+        report(group, "perhaps commands of motors; say so in a columns.toml (--columns)");
       const auto named = std::max_element(group.bits.begin(), group.bits.begin() + kIsMotors);
       const auto slot = std::find_if(slot_kinds().begin(), slot_kinds().end(), [&](const SlotKind& kind) {
         return std::count(kind.quantities.begin(), kind.quantities.end(), named - group.bits.begin()) > 0;
@@ -543,6 +560,7 @@ class Assigner {
     }
   }
 
+  const std::vector<int> kRotorSignals = {kDuty, kRequested, kMotorCommand, kRotorSpeed, kMotorForce};
   const RawLog& log_;
   Recognition& found_;
   const Knots knots_;

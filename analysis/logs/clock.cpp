@@ -7,6 +7,7 @@
 
 #include "analysis/logs/column_names.h"
 #include "analysis/logs/dictionary.h"
+#include "analysis/logs/message_frames.h"
 #include "analysis/logs/statistics_of_series.h"
 #include "nn/base/input_error.h"
 
@@ -19,16 +20,15 @@ constexpr double kReceiverEpoch_s = 315964800, kLeap_s = 18, kWeek_s = 604800;
 /// Returns the time since 1970 of each record of a receiver topic, 0 where it had none; empty for other topics.
 std::vector<double> receiver_times_s(const RawTopic& topic) {
   std::vector<double> times_s;
-  if (const RawColumn* const utc = topic.find("time_utc_usec")) {
-    for (const double us : utc->values) times_s.push_back(1e-6 * us);
-    return times_s;
-  }
-  const RawColumn *const week = topic.find("GWk"), *const ms = topic.find("GMS");
-  if (topic.name.rfind("GPS", 0) != 0 || week == nullptr || ms == nullptr) return times_s;
-  for (std::size_t i = 0; i < std::min(week->values.size(), ms->values.size()); ++i) {
-    const bool has_time = week->values[i] > 0;
-    times_s.push_back(has_time ? kReceiverEpoch_s - kLeap_s + kWeek_s * week->values[i] + 1e-3 * ms->values[i]
-                               : 0);
+  for (const NamedColumns& row : column_names()) {
+    if (row.signal != kTime || row.message.empty() || row.message != message_of(topic)) continue;
+    const RawColumn *const time = topic.find(row.names.back()), *const week = topic.find(row.names[0]);
+    if (time == nullptr || week == nullptr) continue;
+    for (const double value : time->values) times_s.push_back(1e-6 * value * row.multiply / row.divide);
+    for (std::size_t i = 0; row.names.size() > 1 && i < times_s.size(); ++i)
+      times_s[i] =
+          week->values[i] > 0 ? kReceiverEpoch_s - kLeap_s + kWeek_s * week->values[i] + times_s[i] : 0;
+    break;
   }
   return times_s;
 }
@@ -92,28 +92,22 @@ bool starts_again(const std::vector<double>& time_s, const Order& order) {
   return false;
 }
 
-void rearrange(std::vector<double>& values, const Order& order) {
-  std::vector<double> rearranged;
-  rearranged.reserve(order.size());
-  for (const std::size_t i : order) rearranged.push_back(values[i]);
-  values = std::move(rearranged);
-}
-
 [[noreturn]] void refuse_without_clock(const RawLog& log) {
   throw files::InputError({log.path, "line 1", "time", "", "no column carries it",
                            "log it, or name its column in a columns.toml (--columns)"});
 }
 
-double seconds_per_unit(std::vector<double> clock) {
+/// @param stated_s the unit that the name states, believed if it gives a plausible logging rate; 0: none
+double seconds_per_unit(std::vector<double> clock, double stated_s) {
   clock.erase(std::remove_if(clock.begin(), clock.end(), [](double t) { return !std::isfinite(t); }),
               clock.end());
   std::sort(clock.begin(), clock.end());  // rows may be in any order
   std::vector<double> steps = steps_of(clock);
   steps.erase(std::remove(steps.begin(), steps.end(), 0.0), steps.end());
-  constexpr double kSlowest_s = 0.5;
+  constexpr double kSlowest_s = 0.5, kFastest_s = 1e-5;
   const double step = median(steps);
-  for (const double unit_s : {1.0, 1e-3, 1e-6}) {
-    if (step * unit_s <= kSlowest_s) return unit_s;
+  for (const double unit_s : {stated_s, 1.0, 1e-3, 1e-6}) {
+    if (step * unit_s <= kSlowest_s && step * unit_s >= (unit_s == stated_s ? kFastest_s : 0)) return unit_s;
   }
   return steps.empty() ? 1 : 1e-9;
 }
@@ -161,7 +155,7 @@ void separate_blocks(RawLog& log) {
     }
     RawTopic& block = blocks[has_number];
     const bool is_first = block.columns.empty();
-    block.columns.push_back({column.name, column.unit, {}});
+    block.columns.push_back({column.name, {}});
     for (std::size_t i = 0; i < has_number.size(); ++i) {
       if (!has_number[i]) continue;
       block.columns.back().values.push_back(column.values[i]);
@@ -169,14 +163,10 @@ void separate_blocks(RawLog& log) {
     }
   }
   joined.columns = std::move(whole);
-  const auto keep = [&](std::vector<double>& values) {
-    std::size_t kept = 0;
-    for (std::size_t i = 0; i < here.size(); ++i)
-      if (here[i] != 0 || elsewhere[i] == 0) values[kept++] = values[i];
-    values.resize(kept);
-  };
-  for (RawColumn& column : joined.columns) keep(column.values);
-  keep(joined.time_s);
+  Order kept;
+  for (std::size_t i = 0; i < here.size(); ++i)
+    if (here[i] != 0 || elsewhere[i] == 0) kept.push_back(i);
+  keep_records(joined, kept);
   log.health.repaired.merged_blocks += blocks.size();
   const std::string name = joined.name + (joined.name.empty() ? "block " : " block ");
   for (auto& [has_number, block] : blocks) {
@@ -190,7 +180,7 @@ void separate_blocks(RawLog& log) {
 int clock_by_name(const RawTopic& topic) {
   for (const std::string& name : words_of_kind("clock")) {
     for (std::size_t c = 0; c < topic.columns.size(); ++c) {
-      if (plain_name(topic.columns[c].name) == name) return static_cast<int>(c);
+      if (stated_unit(topic.columns[c].name, true).plain == name) return static_cast<int>(c);
     }
   }
   return -1;
@@ -206,12 +196,11 @@ std::optional<Clock> stated_clock(const RawLog& log, const SignalMap& map) {
   };
   for (const SignalSource& source : map)
     if (source.signal == kTime) find(source.column, 1e-6 * source.multiply / source.divide);
-  if (map.empty()) {
-    // "time[ms]" of the published CSV files is in microseconds.
-    for (const char* const name : {"time_us", "time[ms]"}) find(name, 1e-6);
-    const int named = clock_by_name(topic);
-    if (!clock && named >= 0) clock = {static_cast<std::size_t>(named), 0};
-  }
+  for (const NamedColumns& row : column_names())
+    if (map.empty() && row.signal == kTime && row.message.empty())
+      find(row.names[0], 1e-6 * row.multiply / row.divide);
+  const int named = map.empty() ? clock_by_name(topic) : -1;
+  if (!clock && named >= 0) clock = {static_cast<std::size_t>(named), 0};
   if (!clock && !map.empty()) refuse_without_clock(log);
   return clock;
 }
@@ -224,12 +213,26 @@ void set_times(RawLog& log, std::optional<Clock> clock) {
     clock = {static_cast<std::size_t>(steady), 0};
   }
   const RawColumn& column = topic.columns[clock->column];
+  const std::string unit = stated_unit(column.name, true).unit;
+  const double stated_s =
+      unit.empty() ? 0 : 1e-6 * unit_factor(kTime, unit)->multiply / unit_factor(kTime, unit)->divide;
   topic.clock = column.name;
   topic.clock_unit_s = log.format == "usd" ? 1e-6  // the ticks of the deck
                        : clock->unit_s > 0 ? clock->unit_s
-                                           : seconds_per_unit(column.values);
+                                           : seconds_per_unit(column.values, stated_s);
   for (const double time : column.values) topic.time_s.push_back(time * topic.clock_unit_s);
   separate_blocks(log);
+}
+
+void keep_records(RawTopic& topic, const std::vector<std::size_t>& order) {
+  const auto keep = [&order](std::vector<double>& values) {
+    std::vector<double> kept;
+    kept.reserve(order.size());
+    for (const std::size_t i : order) kept.push_back(values[i]);
+    values = std::move(kept);
+  };
+  for (RawColumn& column : topic.columns) keep(column.values);
+  keep(topic.time_s);
 }
 
 Repaired put_in_order(RawTopic& topic) {
@@ -260,8 +263,7 @@ Repaired put_in_order(RawTopic& topic) {
       if (std::isfinite(time_s[i])) latest_s = std::max(latest_s, time_s[i]);
     }
   }
-  for (RawColumn& column : topic.columns) rearrange(column.values, kept);
-  rearrange(time_s, kept);
+  keep_records(topic, kept);
   return repaired;
 }
 
@@ -279,11 +281,8 @@ double receiver_offset_s(const RawLog& log) {
 Interval absolute_span_s(const RawLog& log) {
   double first_s = INFINITY, last_s = -INFINITY;
   for (const RawTopic& topic : log.topics) {
-    for (const double time_s : topic.time_s) {
-      if (!std::isfinite(time_s)) continue;
-      first_s = std::min(first_s, time_s);
-      last_s = std::max(last_s, time_s);
-    }
+    first_s = std::min(first_s, quantile_of(topic.time_s, 0));
+    last_s = std::max(last_s, quantile_of(topic.time_s, 1));
   }
   if (!(last_s > first_s)) return {0, 0};
   if (first_s > kAbsoluteClock_s) return {first_s, last_s};

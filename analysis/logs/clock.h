@@ -30,6 +30,9 @@ std::optional<Clock> stated_clock(const RawLog& log, const SignalMap& map);
 /// @throws files::InputError if no column can be the time.
 void set_times(RawLog& log, std::optional<Clock> clock);
 
+/// Keeps the records of `topic` with these indices, in this order.
+void keep_records(RawTopic& topic, const std::vector<std::size_t>& order);
+
 /// Undoes wraps of the clock, sorts records by time (those without one come last), and keeps one of several records
 /// with the same time and values. A clock that starts again, as after a second take-off in the same file, is not
 /// sorted: the records would mix two flights.

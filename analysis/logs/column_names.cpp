@@ -1,10 +1,12 @@
 #include "analysis/logs/column_names.h"
 
+#include <algorithm>
 #include <cctype>
 #include <map>
 #include <optional>
 
 #include "analysis/logs/dictionary.h"
+#include "nn/base/text.h"
 
 namespace swarmcert::logs {
 namespace {
@@ -64,15 +66,13 @@ std::optional<Index> index_of(const std::string& word) {
 
 bool is_known(const std::string& word) {
   return quantity_words().count(word) > 0 || is_word_of("wish", word) || is_word_of("foreign", word) ||
-         is_word_of("neutral", word) || word == "imu";
+         is_word_of("neutral", word);
 }
 
 /// Returns the words of a name; glued ones are split where both parts are known: "posx", "qw", "pwm1", "xdot".
 std::vector<std::string> words_of(const std::string& plain) {
   std::vector<std::string> words;
-  std::string word;
-  const auto end_word = [&] {
-    if (word.empty()) return;
+  for (const std::string& word : files::split_at(plain, ".")) {
     const std::string head = word.substr(0, word.size() - 1), tail = word.substr(word.size() - 1);
     if (word.size() == 1 || is_known(word) || index_of(word)) {
       words.push_back(word);
@@ -85,37 +85,30 @@ std::vector<std::string> words_of(const std::string& plain) {
     } else {
       words.push_back(word);
     }
-    word.clear();
-  };
-  for (const char c : plain) {
-    if (c == '.')
-      end_word();
-    else
-      word += c;
   }
-  end_word();
   return words;
 }
 
-/// "PosX" becomes "Pos_X", "batteryVoltage" "battery_Voltage".
+/// "PosX" becomes "Pos_X", "batteryVoltage" "battery_Voltage"; "mV" is a unit.
 std::string with_words_apart(const std::string& column) {
   std::string apart;
   for (std::size_t i = 0; i < column.size(); ++i) {
     const auto is = [&](std::size_t at, int (*test)(int)) {
       return test(static_cast<unsigned char>(column[at])) != 0;
     };
-    if (i > 0 && is(i, std::isupper) && is(i - 1, std::islower)) apart += '_';
+    if (i > 1 && is(i, std::isupper) && is(i - 1, std::islower) && is(i - 2, std::isalpha)) apart += '_';
     apart += column[i];
   }
   return apart;
 }
 
-/// Takes the last word that can be an index out of `words`. A lone p, q or r is a body rate.
+/// Takes the last word that can be an index out of `words`.
 std::optional<Index> take_index(std::vector<std::string>& words) {
-  if (words.size() == 1 && (words[0] == "p" || words[0] == "q" || words[0] == "r")) {
-    const int index = words[0] == "p" ? 0 : words[0] == "q" ? 1 : 2;
+  const std::vector<std::string>& rates = words_of_kind("body_rate");
+  const auto rate = std::find(rates.begin(), rates.end(), words.size() == 1 ? words[0] : "");
+  if (rate != rates.end()) {
     words.clear();
-    return Index{IndexKind::kRate, index};
+    return Index{IndexKind::kRate, static_cast<int>(rate - rates.begin())};
   }
   for (std::size_t i = words.size(); i-- > 0;) {
     const std::optional<Index> index = index_of(words[i]);
@@ -175,14 +168,17 @@ std::string plain_name(const std::string& column) {
   return plain;
 }
 
-StatedUnit stated_unit(const std::string& column) {
-  static const std::map<std::string, std::string> spelled = [] {
-    std::map<std::string, std::string> all;
-    const files::TomlTable table = dictionary_table("words.toml").table("spelled");
+StatedUnit stated_unit(const std::string& column, bool is_clock) {
+  using Spellings = std::map<std::string, std::string>;
+  static const auto spellings_in = [](const char* key) {
+    Spellings all;
+    const files::TomlTable table = dictionary_table("words.toml").table(key);
     for (const std::string& unit : table.keys())
       for (const std::string& spelling : table.texts(unit)) all[spelling] = unit;
     return all;
-  }();
+  };
+  static const Spellings of_clocks = spellings_in("spelled_of_clocks"), of_others = spellings_in("spelled");
+  const Spellings& spelled = is_clock ? of_clocks : of_others;
   const std::string plain = plain_name(column);
   const std::size_t open = column.find_last_of("[("), close = column.find_last_of("])");
   if (open != std::string::npos && close != std::string::npos && close > open) {
@@ -196,14 +192,6 @@ StatedUnit stated_unit(const std::string& column) {
     if (known != spelled.end()) return {known->second, plain.substr(0, dot)};
   }
   return {"", plain};
-}
-
-std::vector<std::string> called_names(const std::string& column) {
-  std::vector<std::string> names = {column};
-  const std::size_t dot = column.find('.');
-  if (dot == std::string::npos || column.find('.', dot + 1) == std::string::npos) return names;
-  names.push_back(column.substr(dot + 1));
-  return names;
 }
 
 NameReading read_name(const std::string& column) {
@@ -220,9 +208,9 @@ NameReading read_name(const std::string& column) {
   for (const std::string& word : words) {
     name.family += (name.family.empty() ? "" : ".") + word;
     const auto quantity = quantity_words().find(word);
-    name.says_down = name.says_down || word == "ned" || word == "frd";
-    name.says_up = name.says_up || word == "enu" || word == "flu";
-    if (word == "ang" || word == "angular") {
+    name.says_down = name.says_down || is_word_of("down", word);
+    name.says_up = name.says_up || is_word_of("up", word);
+    if (is_word_of("angular", word)) {
       is_angular = true;
     } else if (quantity != quantity_words().end() && (index || word.size() > 1)) {
       add_bits(quantity->second, name);
@@ -231,7 +219,7 @@ NameReading read_name(const std::string& column) {
       name.is_wish = true;
     } else if (is_word_of("foreign", word)) {
       name.is_foreign = true;
-    } else if (word != "imu") {
+    } else {
       const bool is_neutral = is_word_of("neutral", word) || index_of(word);
       for (double& bits : name.bits) bits -= is_neutral ? 1 : kUnknownWord;
     }

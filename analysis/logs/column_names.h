@@ -62,11 +62,7 @@ struct StatedUnit {
 };
 
 /// Returns the unit in brackets, "vx (mm/s)", or after the last word, "vx_mm_s", "pos_x_m", "roll_deg", "acc_z_mps2".
-StatedUnit stated_unit(const std::string& column);
-
-/// Returns the names under which a column with the plain name `column` is looked up: the name itself and the name
-/// without its first word, unless that word marks a setpoint. "att.stateestimate.qx" is also found as
-/// "stateestimate.qx".
-std::vector<std::string> called_names(const std::string& column);
+/// @param is_clock look for units of time: "t_ms"
+StatedUnit stated_unit(const std::string& column, bool is_clock = false);
 
 }  // namespace swarmcert::logs

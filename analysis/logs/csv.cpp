@@ -2,12 +2,15 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
+#include <ctime>
 #include <limits>
 #include <set>
 
 #include "analysis/logs/clock.h"
 #include "analysis/logs/formats/bytes.h"
 #include "analysis/logs/recognition.h"
+#include "analysis/logs/statistics_of_series.h"
 #include "nn/base/csv.h"
 #include "nn/base/input_error.h"
 
@@ -30,13 +33,6 @@ bool take(std::string_view& text, std::string_view any_of) {
   return true;
 }
 
-/// Returns the days from 1970-01-01 to a Gregorian date. Years start in March so that the leap day comes last.
-std::int64_t days_since_1970(std::int64_t year, int month, int day) {
-  year -= month <= 2 ? 1 : 0;
-  const std::int64_t march_based = (month + 9) % 12;
-  return 365 * year + year / 4 - year / 100 + year / 400 + (153 * march_based + 2) / 5 + day - 719469;
-}
-
 /// Parses a time of day, "12:34:56.7", as seconds since midnight, and a date, "2026-03-02T12:34:56.7" with an optional
 /// "Z" or "+01:00", as seconds since 1970.
 std::optional<double> date_or_time_s(std::string_view text) {
@@ -47,7 +43,9 @@ std::optional<double> date_or_time_s(std::string_view text) {
     if (!take_number(rest, month) || !take(rest, "-/") || !take_number(rest, day) || !take(rest, "T _"))
       return std::nullopt;
     if (year < 1970 || year > 9999 || month < 1 || month > 12 || day < 1 || day > 31) return std::nullopt;
-    days_s = 86400.0 * static_cast<double>(days_since_1970(year, month, day));
+    std::tm date{};
+    date.tm_year = year - 1900, date.tm_mon = month - 1, date.tm_mday = day;
+    days_s = static_cast<double>(timegm(&date));
     text = rest;
   }
   if (!take_number(text, hour) || !take(text, ":") || !take_number(text, minute) || !take(text, ":") ||
@@ -73,22 +71,11 @@ bool parse_cell(std::string_view cell, bool decimal_comma, double& value) {
   cell = files::without_blanks(cell);
   value = std::numeric_limits<double>::quiet_NaN();
   if (cell.empty()) return true;
-  std::string_view digits = cell;
-  if (digits[0] == '+') digits.remove_prefix(1);
-  std::string pointed;
-  if (decimal_comma && digits.find(',') != std::string_view::npos) {
-    pointed = digits;
-    std::replace(pointed.begin(), pointed.end(), ',', '.');
-    digits = pointed;
-  }
-  double number = 0;
-  if (take_number(digits, number) && digits.empty()) {
-    value = number;
-    return true;
-  }
-  const std::optional<double> time_s = date_or_time_s(cell);
-  if (time_s) value = *time_s;
-  return time_s.has_value();
+  std::string pointed(decimal_comma ? cell : "");
+  std::replace(pointed.begin(), pointed.end(), ',', '.');
+  if (files::csv_number(decimal_comma ? pointed : cell, value)) return true;
+  value = date_or_time_s(cell).value_or(std::numeric_limits<double>::quiet_NaN());
+  return std::isfinite(value);
 }
 
 /// A fault of a line that does not have exactly values.size() cells, each a number or empty where one is needed. States
@@ -158,11 +145,34 @@ std::vector<std::string> with_elements(const std::vector<std::string>& names,
   return flat;
 }
 
+/// Adds the nanoseconds that stand in the column after whole seconds to these: they rise within each second.
+void join_nanoseconds(RawTopic& topic) {
+  for (std::size_t c = 0; c + 1 < topic.columns.size(); ++c) {
+    std::vector<double>& seconds = topic.columns[c].values;
+    const std::vector<double>& nanoseconds = topic.columns[c + 1].values;
+    std::size_t same = 0, falls = 0, others = 0;
+    for (std::size_t i = 1; i < seconds.size(); ++i) {
+      const double step = nanoseconds[i] - nanoseconds[i - 1];
+      const bool is_count = seconds[i] == std::floor(seconds[i]) &&
+                            nanoseconds[i] == std::floor(nanoseconds[i]) && nanoseconds[i] >= 0 &&
+                            nanoseconds[i] < 1e9;
+      if (is_count && seconds[i] == seconds[i - 1] && step >= 0)
+        ++same;
+      else if (is_count && seconds[i] > seconds[i - 1])
+        falls += step < 0 ? 1 : 0;
+      else
+        ++others;
+    }
+    if (others > 0 || falls == 0 || 2 * same < seconds.size() || quantile_of(nanoseconds, 1) < 1e6) continue;
+    for (std::size_t i = 0; i < seconds.size(); ++i) seconds[i] += 1e-9 * nanoseconds[i];
+  }
+}
+
 /// Begins the topic of a table; returns which columns must hold numbers.
 std::vector<char> begin_topic(RawLog& log, const std::vector<std::string>& names, const SignalMap& map,
                               std::optional<Clock>& clock) {
   log.topics.emplace_back();
-  for (const std::string& name : names) log.topics.back().columns.push_back({name, "", {}});
+  for (const std::string& name : names) log.topics.back().columns.push_back({name, {}});
   clock = stated_clock(log, map);
   std::vector<char> needs(names.size(), 0);
   if (clock) needs[clock->column] = 1;
@@ -209,7 +219,11 @@ std::optional<TableHeader> header_of(std::string_view text, char otherwise) {
   header.end = std::min(at, text.size());
   double number = 0;
   const std::string_view first = line.substr(0, line.find(files::csv_separator(line, ' ')));
-  if (!comment.empty() && (line.empty() || parse_cell(first, false, number))) {
+  const auto cells_in = [otherwise](std::string_view row) {
+    return files::csv_cells(row, files::csv_separator(row, otherwise)).size();
+  };
+  if (!comment.empty() &&
+      (line.empty() || (parse_cell(first, false, number) && cells_in(comment) == cells_in(line)))) {
     header.end = header.begin;
     header.begin = comment_at;
     --header.line;
@@ -230,6 +244,13 @@ RawLog read_table(std::istream& in, const std::string& path, const SignalMap& ma
   if (header) names.assign(header->names.begin(), header->names.end());
   const std::string where = "line " + std::to_string(header ? header->line : 1);
   std::size_t at = header ? header->end : 0, number = header ? header->line : 0;
+  double first_number = 0;
+  if (!names.empty() &&
+      parse_cell(names[0], header->separator != ',', first_number)) {  // no header, a record
+    for (std::size_t i = 0; i < names.size(); ++i) names[i] = "column " + std::to_string(i + 1);
+    at = header->begin;
+    --number;
+  }
   std::size_t first = at;
   std::vector<std::size_t> counts;
   const std::string_view second = take_text_line(text, first);
@@ -266,6 +287,7 @@ RawLog read_table(std::istream& in, const std::string& path, const SignalMap& ma
       if (!damage) damage = damage_of(*fault, names, path, number);
     }
   }
+  join_nanoseconds(log.topics[0]);
   set_times(log, clock);
   log.health.records = log.topics.front().time_s.size();
   if (damage && log.health.records == 0) throw files::InputError(*damage);

@@ -47,7 +47,7 @@ const SignalKind& kind_of_signal(int signal);
 /// What the names leave open and the data must decide.
 enum class Ask {
   kNothing,
-  kMotors,        ///< requested thrust or applied duty; scale
+  kMotors,        ///< requested thrust or applied duty
   kVelocityFrame  ///< along the axes of the world or of the body
 };
 

@@ -229,16 +229,16 @@ Log interpret(RawLog raw, const SignalMap& map, SignalMap* meaning) {
   keep_one_vehicle(raw, log);
   std::vector<Repaired> repaired;
   for (RawTopic& topic : raw.topics) repaired.push_back(put_in_order(topic));
-  for (const RawDropout& dropout : raw.dropouts) log.health.dropouts_s += dropout.duration_s;
   for (const RawTopic& topic : raw.topics) {
     for (const RawColumn& column : topic.columns) log.channels.push_back(column.name);
   }
   add_own_names(raw, log.interpretation);
+  log.left_out = raw.left_out;
   Draft draft{raw, recognise(raw, map), {}, log, {}, map.empty()};
   if (meaning != nullptr) *meaning = meaning_of(raw, draft.recognition);
   draft.table = signal_table(raw, draft.recognition, log.health, log.events);
   count_repaired(repaired, draft.recognition, log.health.repaired);
-  for (const std::string& corrected : draft.recognition.corrected) draft.note(corrected);
+  for (const std::string& decided : draft.recognition.decided) draft.note(decided);
   for (const std::string& rejected : draft.recognition.rejected) draft.note("not used: " + rejected);
   refuse_without_motion(draft);
   add_landed(raw, log);

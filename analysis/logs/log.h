@@ -100,8 +100,7 @@ struct Repaired {
   std::size_t repeated_rows = 0;     ///< same time and values as another one, which is kept
   std::size_t unwrapped_clocks = 0;  ///< wraps of a counter or a time of day
   std::size_t merged_blocks = 0;     ///< log blocks of other rates than that of the records
-
-  bool any() const { return unsorted_rows + repeated_rows + unwrapped_clocks + merged_blocks > 0; }
+  std::size_t journal_pages = 0;     ///< that a recorder left in the journal of its database (-wal)
 };
 
 /// Damage found in a file and how it was handled; nothing is repaired silently.
@@ -120,6 +119,13 @@ struct LogHealth {
   double dropouts_s = 0;  ///< pauses during which the vehicle reports that it could not write
   std::size_t bytes = 0;  ///< of the file; 0: unknown
   Repaired repaired;
+};
+
+/// Something in a file that its reader did not pass on.
+struct LeftOut {
+  std::string name;         ///< of the topic, message or field
+  std::string why;          ///< e.g. "its format is not defined in the file"
+  std::size_t records = 0;  ///< number of records left out; 0: a part of each
 };
 
 /// How a log provides one signal.
@@ -170,6 +176,7 @@ struct Log {
   Armed armed = Armed::kUnknown;
   double epoch_s = 0;  ///< plus Sample::time_us is the time since 1970; 0: unknown
   LogHealth health;
+  std::vector<LeftOut> left_out;
   std::vector<std::string> channels;  ///< as the file names them
   std::vector<Sample> samples;
 };

@@ -1,5 +1,7 @@
 #include "analysis/logs/message_frames.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cctype>
 #include <cmath>
@@ -7,23 +9,12 @@
 #include <string>
 #include <vector>
 
+#include "analysis/logs/clock.h"
 #include "analysis/logs/dictionary.h"
 #include "analysis/logs/statistics_of_series.h"
 
 namespace swarmcert::logs {
 namespace {
-
-/// Returns "vehicle_local_position" for a topic of that name or of the type px4_msgs/msg/VehicleLocalPosition.
-std::string message_of(const RawTopic& topic) {
-  const std::size_t slash = topic.type.rfind('/');
-  if (topic.type.rfind("px4_msgs", 0) != 0 || slash == std::string::npos) return topic.name;
-  std::string name;
-  for (const char c : topic.type.substr(slash + 1)) {
-    if (std::isupper(static_cast<unsigned char>(c)) != 0 && !name.empty()) name += '_';
-    name += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  }
-  return name;
-}
 
 using Parameters = std::map<std::string, double>;
 constexpr std::size_t kMostMotors = 8;
@@ -78,7 +69,7 @@ void add_outputs(RawTopic& topic, const NamedColumns& row, const Parameters& par
   for (std::size_t k = 0; k < std::min(outputs.size(), kMostMotors); ++k) {
     const RawColumn* const column = topic.find(outputs[k]);
     if (column == nullptr || (!is_assigned && !is_in_use(column->values, row.unit))) return;
-    RawColumn command{own_name(kMotorCommand, k), "", column->values};
+    RawColumn command{own_name(kMotorCommand, k), column->values};
     for (double& value : command.values)  // disarmed: no number
       value = std::isfinite(value) ? std::clamp((value - low) / (high - low), 0.0, 1.0) : 0;
     topic.columns.push_back(std::move(command));
@@ -90,24 +81,30 @@ void add_columns(RawTopic& topic, const NamedColumns& row) {
   const bool has_all = std::all_of(row.names.begin(), row.names.end(),
                                    [&](const std::string& name) { return topic.find(name) != nullptr; });
   for (std::size_t k = 0; has_all && k < row.names.size(); ++k) {
-    RawColumn copy{own_name(row.signal, k), "", topic.find(row.names[k])->values};
+    RawColumn copy{own_name(row.signal, k), topic.find(row.names[k])->values};
     if (topic.find(copy.name) != nullptr) continue;
     for (double& value : copy.values) value *= row.sign[k] * row.multiply / row.divide;
     topic.columns.push_back(std::move(copy));
   }
 }
 
-/// Removes the columns that the estimator never marks as valid, and notes them.
-void remove_invalid(RawTopic& topic, const Sign& sign, std::vector<std::string>& notes) {
+/// Leaves out the records that the estimator does not mark as valid or, if they are most, the columns.
+void remove_invalid(RawTopic& topic, const Sign& sign, RawLog& log, std::vector<std::string>& notes) {
   const RawColumn* const flag = topic.find(sign.column);
-  if (flag == nullptr || std::any_of(flag->values.begin(), flag->values.end(),
-                                     [&](double value) { return sign.is_within(value); }))
-    return;
+  if (flag == nullptr) return;
+  std::vector<std::size_t> valid, invalid;
+  for (std::size_t i = 0; i < flag->values.size(); ++i)
+    (sign.is_within(flag->values[i]) ? valid : invalid).push_back(i);
+  if (invalid.empty()) return;
+  const std::string why = fmt::format("the estimator says {} = {:g}", sign.column, flag->values[invalid[0]]);
+  if (valid.size() >= invalid.size()) {
+    log.left_out.push_back({topic.name, why, invalid.size()});
+    return keep_records(topic, valid);
+  }
   for (RawColumn& column : topic.columns) {
     if (std::find(sign.of.begin(), sign.of.end(), column.name) == sign.of.end()) continue;
     column.values.assign(column.values.size(), NAN);
-    notes.push_back("not used: " + topic.name + ": " + column.name + ": the estimator says " + sign.column +
-                    " = 0");
+    notes.push_back("not used: " + topic.name + ": " + column.name + ": " + why);
   }
 }
 
@@ -136,6 +133,17 @@ Armed any_record(const RawLog& log, const Sign& sign) {
 
 }  // namespace
 
+std::string message_of(const RawTopic& topic) {
+  const std::size_t slash = topic.type.rfind('/');
+  if (topic.type.rfind("px4_msgs", 0) != 0 || slash == std::string::npos) return topic.name;
+  std::string name;
+  for (const char c : topic.type.substr(slash + 1)) {
+    if (std::isupper(static_cast<unsigned char>(c)) != 0 && !name.empty()) name += '_';
+    name += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  }
+  return name;
+}
+
 std::string firmware_of(const RawLog& log, const RawTopic& topic) {
   if (log.format == "ardupilot") return "ardupilot";
   return log.format == "ulog" || topic.type.rfind("px4_msgs", 0) == 0 ? "px4" : "";
@@ -154,9 +162,11 @@ void add_own_names(RawLog& log, std::vector<std::string>& notes) {
     const std::string message = message_of(topic), firmware = firmware_of(log, topic);
     if (topic.instance != first[message].second || firmware.empty()) continue;
     for (const Sign& sign : signs_of_state())
-      if (sign.means == "valid" && sign.message == message) remove_invalid(topic, sign, notes);
+      if (sign.means == "valid" && sign.message == message) remove_invalid(topic, sign, log, notes);
     for (const NamedColumns& row : column_names()) {
-      if (row.program != firmware || row.message != message || first.count(row.instead_of) != 0) continue;
+      if (row.program != firmware || row.message != message || first.count(row.instead_of) != 0 ||
+          row.signal == kTime)
+        continue;
       if (row.signal == kMotorCommand)
         add_outputs(topic, row, log.parameters);
       else
@@ -197,11 +207,11 @@ Armed was_armed(const RawLog& log) {
 std::string vehicle_without_rotors(const RawLog& log) {
   for (const Sign& sign : signs_of_vehicle()) {
     const auto parameter = log.parameters.find(sign.parameter);
-    const bool holds = (parameter != log.parameters.end() && sign.is_within(parameter->second)) ||
-                       (!sign.column.empty() && any_record(log, sign) == Armed::kYes) ||
-                       (!sign.text.empty() &&
-                        std::any_of(log.messages.begin(), log.messages.end(),
-                                    [&](const RawMessage& m) { return m.text.rfind(sign.text, 0) == 0; }));
+    const bool holds =
+        (parameter != log.parameters.end() && sign.is_within(parameter->second)) ||
+        (!sign.column.empty() && any_record(log, sign) == Armed::kYes) ||
+        (!sign.text.empty() && std::any_of(log.messages.begin(), log.messages.end(),
+                                           [&](const std::string& m) { return m.rfind(sign.text, 0) == 0; }));
     if (holds) return sign.means == "multirotor" ? "" : sign.means;
   }
   return "";

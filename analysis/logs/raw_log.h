@@ -14,7 +14,6 @@ namespace swarmcert::logs {
 /// A field of a topic. `values` has one entry per time of the topic; NaN where the file has none.
 struct RawColumn {
   std::string name;  ///< as the file names it, arrays as `q[0]`, nested fields as `pose.position.x`
-  std::string unit;  ///< as the file states it; empty: not stated
   std::vector<double> values;
 };
 
@@ -36,34 +35,14 @@ struct RawTopic {
   }
 };
 
-/// A line that the vehicle wrote while logging, e.g. "Takeoff detected".
-struct RawMessage {
-  double time_s = 0;
-  std::string text;
-};
-
-/// A pause during which the vehicle reports that it could not write.
-struct RawDropout {
-  double time_s = 0;  ///< of the last record before the pause
-  double duration_s = 0;
-};
-
-/// Something in the file that the reader did not pass on.
-struct RawSkip {
-  std::string name;         ///< of the topic, message or field
-  std::string why;          ///< e.g. "its format is not defined in the file"
-  std::size_t records = 0;  ///< number of records left out
-};
-
 struct RawLog {
   std::string path;
   std::string format;  ///< e.g. "ulog", "mcap", "rosbag2 sqlite", "ardupilot"
   std::vector<RawTopic> topics;
   /// Parameters of the vehicle at the start of the log, by their names in the file.
   std::map<std::string, double> parameters;
-  std::vector<RawMessage> messages;
-  std::vector<RawDropout> dropouts;
-  std::vector<RawSkip> skipped;
+  std::vector<std::string> messages;  ///< that ArduPilot wrote while logging, e.g. "ArduCopter V4.5.1"
+  std::vector<LeftOut> left_out;
   LogHealth health;
 };
 

@@ -27,7 +27,8 @@ bool looks_like_table(std::string_view head) {
   const bool is_text = std::all_of(head.begin(), head.end(), [](char c) {
     return static_cast<unsigned char>(c) >= ' ' || c == '\n' || c == '\r' || c == '\t';
   });
-  return is_text && head.find_first_of(",;\t") != std::string_view::npos;
+  const bool has_only_numbers = head.find_first_not_of("0123456789+-.eE \r\n") == std::string_view::npos;
+  return is_text && (has_only_numbers || head.find_first_of(",;\t") != std::string_view::npos);
 }
 bool is_table(std::string_view head) { return format_of(head) == nullptr && looks_like_table(head); }
 

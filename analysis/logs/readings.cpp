@@ -132,7 +132,7 @@ class Reader {
     base_.carried.columns = group.columns;
   }
 
-  std::vector<Reading> lengths(int signal, const char* what, const std::string& per_time, double usual,
+  std::vector<Reading> lengths(int signal, const std::string& what, const std::string& per_time, double usual,
                                double factor) {
     const bool is_place = per_time.empty();
     for (const UnitPrior& unit : {UnitPrior{"m", 0}, {"mm", kOtherUnit}, {"cm", kOtherUnit}})
@@ -242,7 +242,8 @@ class Reader {
   }
 
   template <typename Judge>
-  void each_frame(int signal, const char* what, const std::string& unit, double against, const Judge& judge) {
+  void each_frame(int signal, const std::string& what, const std::string& unit, double against,
+                  const Judge& judge) {
     Reading plain = base_;
     if (group_.columns.size() != 3 || !set_unit(plain, signal, unit, against)) return;
     const double factor = plain.carried.multiply / plain.carried.divide;
@@ -365,26 +366,15 @@ std::optional<Quantity> quantity_of(int signal) {
 std::vector<Reading> readings_of(const RawLog& log, const Knots& knots, const ColumnGroup& group,
                                  Quantity quantity) {
   Reader reader(log, knots, group, quantity);
-  switch (quantity) {
-    case kIsPosition:
-      return reader.lengths(kPosition, "position", "", 1.5, 10);
-    case kIsVelocity:
-      return reader.lengths(kVelocity, "velocity", "/s", 1, 6);
-    case kIsTargetPosition:
-      return reader.lengths(kTargetPosition, "target position", "", 1.5, 10);
-    case kIsTargetVelocity:
-      return reader.lengths(kTargetVelocity, "target velocity", "/s", 1, 6);
-    case kIsSpecificForce:
-      return reader.specific_forces();
-    case kIsRates:
-      return reader.rates();
-    case kIsQuaternion:
-      return reader.quaternions();
-    case kIsAngles:
-      return reader.angles();
-    default:
-      return {};
-  }
+  if (quantity == kIsSpecificForce) return reader.specific_forces();
+  if (quantity == kIsRates) return reader.rates();
+  if (quantity == kIsQuaternion) return reader.quaternions();
+  if (quantity == kIsAngles) return reader.angles();
+  const bool is_target = quantity == kIsTargetPosition || quantity == kIsTargetVelocity;
+  const std::string prefix = is_target ? "target " : "";
+  return quantity == kIsPosition || quantity == kIsTargetPosition
+             ? reader.lengths(is_target ? kTargetPosition : kPosition, prefix + "position", "", 1.5, 10)
+             : reader.lengths(is_target ? kTargetVelocity : kVelocity, prefix + "velocity", "/s", 1, 6);
 }
 
 std::vector<Reading> readings_of_known(const RawLog& log, const Knots& knots, const Carried& carried) {

@@ -28,9 +28,14 @@ class ColumnIndex {
       const std::string& name = topic.columns[c].name;
       const auto index = static_cast<int>(c);
       exact_.emplace(name, index);
-      const std::vector<std::string> called = called_names(plain_name(name));
-      whole_.emplace(called[0], index);
-      if (called.size() > 1 && !read_name(name).is_foreign) shortened_.emplace(called[1], index);
+      const std::string plain = plain_name(name);
+      whole_.emplace(plain, index);
+      // "cf1.att.stateestimate.qx" is also found as "stateestimate.qx".
+      for (std::size_t dot = plain.find('.'); dot < plain.rfind('.'); dot = plain.find('.', dot + 1)) {
+        const NameReading before = read_name(plain.substr(0, dot));
+        if (before.is_foreign || before.is_wish || read_name(name).is_foreign) break;
+        shortened_.emplace(plain.substr(dot + 1), index);
+      }
     }
   }
 
@@ -59,17 +64,6 @@ void drop_empty_columns(const RawTopic& topic, Carried& carried) {
       c = -1;
 }
 
-/// A position in a topic of setpoints is a desired one.
-bool is_wish(const RawTopic& topic, int signal) {
-  if (kind_of_signal(signal).is_command) return false;
-  const std::string name = plain_name(topic.name);
-  for (const char* const word :
-       {"setpoint", "set.point", "target", "reference", "desired", "command", "cmd"}) {
-    if (name.find(word) != std::string::npos) return true;
-  }
-  return false;
-}
-
 void recognise_row(const RawLog& log, const std::vector<ColumnIndex>& indices, const NamedColumns& row,
                    bool is_shortened, Recognition& found) {
   for (std::size_t t = 0; t < log.topics.size() && found.find(row.signal) == nullptr; ++t) {
@@ -91,7 +85,9 @@ void recognise_row(const RawLog& log, const std::vector<ColumnIndex>& indices, c
     const auto missing = std::count(carried.columns.begin(), carried.columns.end(), -1);
     const auto size = static_cast<std::ptrdiff_t>(carried.columns.size());
     const SignalKind& kind = kind_of_signal(row.signal);
-    if (missing == size || (missing > 0 && !kind.may_be_partial) || is_wish(topic, row.signal)) continue;
+    // A position in a topic of set points is a desired one.
+    const bool is_wish = !kind.is_command && read_name(topic.name).is_wish;
+    if (missing == size || (missing > 0 && !kind.may_be_partial) || is_wish) continue;
     const bool is_quaternion = row.signal == kAttitude;
     const bool is_sound = is_quaternion ? is_unit_quaternion(topic, carried.columns)
                                         : kind.is_command || !is_dead(topic, carried);
@@ -112,7 +108,7 @@ void recognise_by_names(const RawLog& log, Recognition& found) {
   const std::vector<ColumnIndex> indices(log.topics.begin(), log.topics.end());
   std::set<std::string> programs;  // of which names are found
   for (const NamedColumns& row : column_names()) {
-    if (row.origin == Origin::kFirmware) continue;
+    if (row.origin == Origin::kFirmware || row.signal == kTime) continue;
     if (row.origin == Origin::kCommonWords && programs.count(row.program) == 0 && log.format != "usd")
       continue;
     const std::size_t before = found.groups.size();

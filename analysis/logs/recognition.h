@@ -32,8 +32,9 @@ struct Carried {
 struct Recognition {
   std::vector<Carried> groups;         ///< at most one per first signal
   std::size_t clock = 0;               ///< the topic whose records become samples
-  std::vector<std::string> rejected;   ///< groups with dead values or several possible meanings, in words
-  std::vector<std::string> corrected;  ///< units of known names that the motion contradicts, in words
+  std::vector<std::string> rejected;  ///< groups with dead values or several possible meanings, in words
+  /// Units that the values show, also where the motion contradicts known names, in words.
+  std::vector<std::string> decided;
 
   const Carried* find(int signal) const;
   Carried* find(int signal);

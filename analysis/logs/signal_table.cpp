@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <optional>
 #include <utility>
 
 #include "analysis/logs/statistics_of_series.h"
@@ -85,72 +84,41 @@ std::vector<double> times_us(const RawTopic& topic) {
   return times;
 }
 
-/// Selects the records that are kept.
-class RecordFilter {
- public:
-  RecordFilter(SignalTable& table, LogHealth& health) : table_(table), health_(health) {}
-
-  void take(std::size_t record, double time_us, bool is_finite) {
-    if (!is_finite || !std::isfinite(time_us)) {
-      ++health_.not_finite;
-      return;
+/// Selects the records that are kept, and sets the times of the table.
+/// @param candidates whose signals are finite
+/// @param longest_s step that is no gap
+std::vector<std::size_t> kept_records(const std::vector<double>& clock_us,
+                                      const std::vector<std::size_t>& candidates, double longest_s,
+                                      SignalTable& table, LogHealth& health) {
+  const auto follows = [](double step_us) { return step_us > 0 && step_us <= kLongestPause_us; };
+  std::vector<std::size_t> kept;
+  for (std::size_t c = 0; c < candidates.size(); ++c) {
+    const double now = clock_us[candidates[c]];
+    if (kept.size() == 1 && now <= clock_us[kept[0]]) {  // the first record was the outlier
+      kept.clear();
+      ++health.clock_jumps;
     }
-    if (pending_) {
-      const double after = time_us - pending_->time_us;
-      if (after > 0 && after <= kLongestPause_us)
-        accept(*pending_);
-      else
-        ++health_.clock_jumps;
-      pending_.reset();
-    }
-    if (kept_.size() == 1 && time_us <= table_.time_us[0]) {  // the first record was the outlier
-      kept_.clear();
-      table_.time_us.clear();
-      table_.restarts.clear();
-      ++health_.clock_jumps;
-    }
-    const double step = kept_.empty() ? 1 : time_us - table_.time_us.back();
-    if (step <= 0)
-      ++health_.clock_jumps;
-    else if (step > kLongestPause_us)
-      pending_ = Pending{record, time_us};
+    const double step_us = kept.empty() ? 1 : now - clock_us[kept.back()];
+    const bool is_confirmed =
+        step_us > 0 && c + 1 < candidates.size() && follows(clock_us[candidates[c + 1]] - now);
+    if (follows(step_us) || is_confirmed)
+      kept.push_back(candidates[c]);
     else
-      accept({record, time_us});
+      ++health.clock_jumps;
   }
-
-  std::vector<std::size_t> end() {
-    if (pending_) ++health_.clock_jumps;
-    health_.records = kept_.size();
-    return std::move(kept_);
-  }
-
-  double longest_gap_s = kLongestGap_s;
-
- private:
-  struct Pending {
-    std::size_t record;
-    double time_us;
-  };
-  void accept(const Pending& record) {
-    bool restarts = true;
-    if (!kept_.empty()) {
-      const double pause_s = (record.time_us - table_.time_us.back()) * 1e-6;
-      restarts = pause_s > longest_gap_s;
-      if (restarts) {
-        ++health_.gaps;
-        health_.longest_gap_s = std::max(health_.longest_gap_s, pause_s);
-      }
+  for (const std::size_t record : kept) {
+    const double now = clock_us[record];
+    const double pause_s = table.time_us.empty() ? INFINITY : 1e-6 * (now - table.time_us.back());
+    table.restarts.push_back(pause_s > longest_s ? 1 : 0);
+    if (pause_s > longest_s && std::isfinite(pause_s)) {
+      ++health.gaps;
+      health.longest_gap_s = std::max(health.longest_gap_s, pause_s);
     }
-    kept_.push_back(record.record);
-    table_.time_us.push_back(record.time_us);
-    table_.restarts.push_back(restarts ? 1 : 0);
+    table.time_us.push_back(now);
   }
-
-  SignalTable& table_;
-  LogHealth& health_;
-  std::vector<std::size_t> kept_;
-  std::optional<Pending> pending_;
-};
+  health.records = kept.size();
+  return kept;
+}
 
 /// Quaternions without unit norm are no rotations.
 void drop_bad_quaternions(std::array<std::vector<double>, kNumSignals>& all) {
@@ -224,7 +192,6 @@ SignalTable signal_table(const RawLog& log, const Recognition& recognition, LogH
   SignalTable table;
   if (log.topics.empty()) return table;
   const RawTopic& clock = log.topics[recognition.clock];
-  RecordFilter filter(table, health);
   const std::vector<double> clock_us = times_us(clock);
   std::vector<double> clock_s;
   for (const double time_us : clock_us) clock_s.push_back(1e-6 * time_us);
@@ -264,7 +231,7 @@ SignalTable signal_table(const RawLog& log, const Recognition& recognition, LogH
     }
   }
   drop_bad_quaternions(all);
-  filter.longest_gap_s = longest_gap_s(median_step(clock_s));
+  std::vector<std::size_t> candidates;
   for (std::size_t i = 0; i < clock_us.size(); ++i) {
     bool is_finite = true, others_know = true;
     for (int signal = 0; signal < kNumSignals; ++signal) {
@@ -274,9 +241,13 @@ SignalTable signal_table(const RawLog& log, const Recognition& recognition, LogH
     }
     if (!others_know && is_finite)
       continue;  // another topic has not begun, has ended or has a gap: not damage
-    filter.take(i, clock_us[i], is_finite);
+    if (is_finite && std::isfinite(clock_us[i]))
+      candidates.push_back(i);
+    else
+      ++health.not_finite;
   }
-  const std::vector<std::size_t> kept = filter.end();
+  const std::vector<std::size_t> kept =
+      kept_records(clock_us, candidates, longest_gap_s(median_step(clock_s)), table, health);
   for (std::size_t s = 0; s < all.size(); ++s) {
     if (all[s].empty()) continue;
     table.values[s].reserve(kept.size());

@@ -74,14 +74,8 @@ std::vector<std::vector<double>> derivatives_of_fits(const SignalTable& table,
 std::vector<std::vector<double>> local_derivatives(const SignalTable& table,
                                                    const std::vector<double>& series, double window_s,
                                                    int degree, const std::vector<int>& derivatives) {
-  switch (degree) {
-    case 1:
-      return derivatives_of_fits<1>(table, series, window_s, derivatives);
-    case 2:
-      return derivatives_of_fits<2>(table, series, window_s, derivatives);
-    default:
-      return derivatives_of_fits<3>(table, series, window_s, derivatives);
-  }
+  return degree == 2 ? derivatives_of_fits<2>(table, series, window_s, derivatives)
+                     : derivatives_of_fits<3>(table, series, window_s, derivatives);
 }
 
 }  // namespace swarmcert::logs

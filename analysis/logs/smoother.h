@@ -18,7 +18,7 @@ inline double position_window_s(double step_s) { return std::max(kPositionWindow
 /// Returns derivatives of `series` at each record, in this order, from a polynomial fitted by least squares to the
 /// records within half a window, never across a gap. At the ends of a stretch the window is one-sided. NaN if a stretch
 /// is too short.
-/// @param degree 1 to 3; `derivatives` are 0 to degree
+/// @param degree 2 or 3; `derivatives` are 0 to degree
 std::vector<std::vector<double>> local_derivatives(const SignalTable& table,
                                                    const std::vector<double>& series, double window_s,
                                                    int degree, const std::vector<int>& derivatives);

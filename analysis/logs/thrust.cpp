@@ -83,41 +83,11 @@ void set_hover_multiple(Draft& draft, const Rotors& rotors, bool squares_only, c
             fmt::format("{} of {} over the value that carries the weight, at a mean command of {:.4g}", what,
                         rotors.from, draft.log.hover_command),
             "weight", scale.scatter);
-  draft.note(fmt::format("thrust {} in {}: relative scatter {:.3f} (linear {:.3f}, quadratic {:.3f})",
-                         is_square ? "quadratic" : "linear", rotors.from, scale.scatter, of_linear.scatter,
-                         of_square.scatter));
-}
-
-/// Determines the scale of duty columns; returns false for microseconds of a servo signal, which do not give a duty.
-bool settle_duty_scale(Draft& draft) {
-  Carried* const carried = draft.recognition.find(kDuty);
-  SignalTable& t = draft.table;
-  if (carried == nullptr || carried->ask != Ask::kMotors || !draft.asks_physics) return carried != nullptr;
-  double largest = 0;
-  for (int k = 0; k < kFour; ++k) largest = std::max(largest, quantile_of(t[kDuty + k], 1));
-  if (largest > 800 && largest < 2500) {  // microseconds
-    for (int k = 0; k < kFour; ++k) {
-      t[kMotorCommand + k] = t[kDuty + k];
-      for (double& u : t[kMotorCommand + k]) u = std::min(std::max((u - 1000) / 1000, 0.0), 1.0);
-      t[kDuty + k].clear();
-    }
-    draft.note(names_of(draft.raw, *carried) + ": read as microseconds, 1000 to 2000");
-    carried->signal = kMotorCommand;
-    carried->divide = carried->offset = 1000;
-    carried->unit = "us";
-    return false;
-  }
-  double scale = 1;
-  for (const double full : {65536.0, 1000.0, 255.0, 100.0}) {
-    if (largest > 1.5 && largest <= full) scale = full;
-  }
-  for (int k = 0; k < kFour; ++k) {
-    for (double& u : t[kDuty + k]) u /= scale;
-  }
-  carried->divide *= scale;
-  carried->unit = unit_of_factor(kDuty, carried->multiply / carried->divide);
-  draft.note(fmt::format("{}: read as duty over {:g}", names_of(draft.raw, *carried), scale));
-  return true;
+  draft.note(fmt::format("thrust {} in {}: ", is_square ? "quadratic" : "linear", rotors.from) +
+             (of_linear.scatter + of_square.scatter > 0
+                  ? fmt::format("relative scatter {:.3f} (linear {:.3f}, quadratic {:.3f})", scale.scatter,
+                                of_linear.scatter, of_square.scatter)
+                  : "assumed: no load shows which"));
 }
 
 /// "motor.m1" is the requested thrust in some firmware versions and the applied duty in others: decided by which of the
@@ -179,13 +149,6 @@ void derive_battery(SignalTable& t) {
 void settle_battery(Draft& draft, bool can_derive) {
   SignalTable& t = draft.table;
   if (t.has(kBattery)) {
-    const double middle = median(t[kBattery]);
-    if (middle > 500 && draft.asks_physics) {
-      for (double& v : t[kBattery]) v /= 1000;
-      draft.recognition.find(kBattery)->divide *= 1000;
-      draft.recognition.find(kBattery)->unit = "mV";
-      draft.note(fmt::format("battery: median {:.0f}, read as millivolt", middle));
-    }
     draft.add_measured("battery", kBattery);
   } else if (can_derive) {
     derive_battery(draft.table);
@@ -253,7 +216,7 @@ int number_of_commands(const SignalTable& t) {
 void settle_thrust(Draft& draft) {
   SignalTable& t = draft.table;
   Signals& signals = draft.log.signals;
-  const bool has_duty = settle_duty_scale(draft) && t.has_group(kDuty, kFour);
+  const bool has_duty = t.has_group(kDuty, kFour);
   bool has_request = t.has_group(kRequested, kFour);
   settle_battery(draft, has_duty && has_request);
   if (has_duty) {

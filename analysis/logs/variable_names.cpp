@@ -6,8 +6,10 @@
 #include <filesystem>
 
 #include "analysis/logs/csv.h"
+#include "nn/base/csv.h"
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
+#include "nn/base/text.h"
 
 namespace swarmcert::logs {
 namespace {
@@ -16,18 +18,11 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kLargestYaml_bytes = std::size_t{1} << 20;
 
-std::string_view trimmed(std::string_view text) {
-  const auto is_blank = [](char c) { return c == ' ' || c == '\t'; };
-  while (!text.empty() && is_blank(text.front())) text.remove_prefix(1);
-  while (!text.empty() && is_blank(text.back())) text.remove_suffix(1);
-  return text;
-}
-
+/// Returns `text` without blanks and quotes around it.
 std::string unquoted(std::string_view text) {
-  text = trimmed(text);
-  const bool quoted = text.size() >= 2 && (text.front() == '"' || text.front() == '\'');
-  if (quoted && text.back() == text.front()) text = text.substr(1, text.size() - 2);
-  return std::string(text);
+  text = files::without_blanks(text);
+  const bool is_quoted = text.size() >= 2 && text.front() == '\'' && text.back() == '\'';
+  return std::string(is_quoted ? text.substr(1, text.size() - 2) : text);
 }
 
 std::string_view before_comment(std::string_view line) {
@@ -36,79 +31,6 @@ std::string_view before_comment(std::string_view line) {
   }
   return line;
 }
-
-/// Reads the subset of YAML used by crazyflies.yaml: nested mappings, lists in brackets and lists of dashes.
-class YamlReader {
- public:
-  explicit YamlReader(CustomTopics& found) : found_(found) {}
-
-  void line(std::string_view text) {
-    text = before_comment(text);
-    const std::size_t indent = std::min(text.find_first_not_of(' '), text.size());
-    text = trimmed(text);
-    if (text.empty()) return;
-    if (in_brackets_) {
-      add_items(text);
-      return;
-    }
-    if (text.front() == '-' && (text.size() == 1 || text[1] == ' ')) {
-      if (list_ != nullptr) list_->push_back(unquoted(text.substr(1)));
-      return;
-    }
-    const std::size_t colon = text.find(':');
-    if (colon == std::string_view::npos) return;
-    while (!path_.empty() && path_.back().indent >= indent) path_.pop_back();
-    path_.push_back({indent, unquoted(text.substr(0, colon))});
-    list_ = nullptr;
-    value(trimmed(text.substr(colon + 1)));
-  }
-
- private:
-  struct Key {
-    std::size_t indent;
-    std::string name;
-  };
-
-  /// Returns the element `places` after the first key called `section`; empty if the path has none.
-  std::string behind(const std::string& section, std::size_t places) const {
-    for (std::size_t i = 0; i + places < path_.size(); ++i)
-      if (path_[i].name == section) return path_[i + places].name;
-    return "";
-  }
-
-  void value(std::string_view text) {
-    const std::size_t depth = path_.size();
-    const std::string robot = behind("robots", 1), type = behind("robot_types", 1);
-    if (path_.back().name == "type" && !robot.empty() && path_[depth - 2].name == robot)
-      found_.type_of_robot[robot] = unquoted(text);
-    if (path_.back().name != "vars" || depth < 3 || path_[depth - 3].name != "custom_topics") return;
-    const std::string owner = !robot.empty()  ? "robots/" + robot
-                              : !type.empty() ? "robot_types/" + type
-                                              : "all";
-    list_ = &found_.named[{owner, path_[depth - 2].name}];
-    list_->clear();
-    if (text.empty() || text.front() != '[') return;
-    in_brackets_ = true;
-    add_items(text.substr(1));
-  }
-
-  void add_items(std::string_view text) {
-    const std::size_t end = text.find(']');
-    if (end != std::string_view::npos) in_brackets_ = false;
-    text = text.substr(0, end);
-    while (!text.empty()) {
-      const std::size_t comma = std::min(text.find(','), text.size());
-      std::string item = unquoted(text.substr(0, comma));
-      if (!item.empty()) list_->push_back(std::move(item));
-      text.remove_prefix(std::min(comma + 1, text.size()));
-    }
-  }
-
-  CustomTopics& found_;
-  std::vector<Key> path_;
-  std::vector<std::string>* list_ = nullptr;  ///< of the `vars` whose items follow
-  bool in_brackets_ = false;
-};
 
 /// Returns the path of the crazyflies.yaml that belongs to the log; empty if there is none.
 fs::path yaml_beside(const std::string& log) {
@@ -155,10 +77,52 @@ std::vector<std::string> CustomTopics::variables(const std::string& topic) const
   return {};
 }
 
+void for_each_value(std::string_view yaml, const YamlUse& use) {
+  std::vector<std::size_t> indents;
+  std::vector<std::string> keys;
+  bool in_brackets = false;
+  for (std::size_t at = 0; at < yaml.size();) {
+    std::string_view text = before_comment(take_text_line(yaml, at));
+    const std::size_t indent = std::min(text.find_first_not_of(' '), text.size());
+    text.remove_prefix(indent);
+    const bool is_item = !in_brackets && (text.substr(0, 2) == "- " || text == "-");
+    if (is_item) {
+      text.remove_prefix(1);
+    } else if (!in_brackets) {
+      const std::size_t colon = text.find(':');
+      if (colon == std::string_view::npos) continue;
+      for (; !indents.empty() && indents.back() >= indent; indents.pop_back()) keys.pop_back();
+      indents.push_back(indent);
+      keys.push_back(unquoted(text.substr(0, colon)));
+      text.remove_prefix(std::min(text.find_first_not_of(" \t", colon + 1), text.size()));
+      in_brackets = text.substr(0, 1) == "[";
+      if (in_brackets) text.remove_prefix(1);
+    }
+    const std::size_t end = in_brackets ? text.find(']') : std::string_view::npos;
+    for (const std::string& part :
+         in_brackets ? files::split_at_commas(text.substr(0, end)) : std::vector{std::string(text)})
+      if (std::string value = unquoted(part); !value.empty()) use(keys, value);
+    if (end != std::string_view::npos) in_brackets = false;
+  }
+}
+
 CustomTopics parse_custom_topics(std::string_view yaml) {
   CustomTopics found;
-  YamlReader reader(found);
-  for (std::size_t at = 0; at < yaml.size();) reader.line(take_text_line(yaml, at));
+  for_each_value(yaml, [&](const std::vector<std::string>& keys, const std::string& value) {
+    const std::size_t depth = keys.size();
+    const auto below = [&](const char* section) {
+      const auto at = std::find(keys.begin(), keys.end(), section);
+      return keys.end() - at < 2 ? std::string() : at[1];
+    };
+    const std::string robot = below("robots"), type = below("robot_types");
+    if (depth > 1 && keys[depth - 1] == "type" && keys[depth - 2] == robot)
+      found.type_of_robot[robot] = value;
+    if (depth < 3 || keys[depth - 1] != "vars" || keys[depth - 3] != "custom_topics") return;
+    const std::string owner = !robot.empty()  ? "robots/" + robot
+                              : !type.empty() ? "robot_types/" + type
+                                              : "all";
+    found.named[{owner, keys[depth - 2]}].push_back(value);
+  });
   return found;
 }
 

@@ -1,6 +1,7 @@
 /// @file Column names from files beside a log: crazyflies.yaml names the values of Crazyswarm2's LogDataGeneric.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <string>
 #include <string_view>
@@ -10,6 +11,13 @@
 #include "analysis/logs/raw_log.h"
 
 namespace swarmcert::logs {
+
+/// Receives the keys above a value, outermost first, and the value.
+using YamlUse = std::function<void(const std::vector<std::string>& keys, const std::string& value)>;
+
+/// Goes through the values of a YAML file, lists element by element: nested mappings, lists in brackets and of dashes.
+/// Lines of any other form are ignored, because the file belongs to another program.
+void for_each_value(std::string_view yaml, const YamlUse& use);
 
 /// Log variables of the custom topics in a crazyflies.yaml.
 struct CustomTopics {
@@ -22,8 +30,7 @@ struct CustomTopics {
   std::vector<std::string> variables(const std::string& topic) const;
 };
 
-/// Reads `robots`, `robot_types` and `all` of a crazyflies.yaml at any depth. Lines that do not match are ignored,
-/// because the file belongs to another program.
+/// Reads `robots`, `robot_types` and `all` of a crazyflies.yaml at any depth.
 CustomTopics parse_custom_topics(std::string_view yaml);
 
 /// Renames the columns `values[i]` of LogDataGeneric topics if a crazyflies.yaml beside the log names as many variables

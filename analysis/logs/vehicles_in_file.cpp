@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cctype>
 #include <filesystem>
-#include <fstream>
 #include <map>
 #include <optional>
 #include <regex>
@@ -65,18 +64,13 @@ std::string vehicle_name(std::string_view entry, std::string_view column) {
 
 RawTopic topic_with(const std::vector<std::string_view>& names) {
   RawTopic topic;
-  for (const std::string_view name : names) topic.columns.push_back({std::string(name), "", {}});
+  for (const std::string_view name : names) topic.columns.push_back({std::string(name), {}});
   return topic;
 }
 
 std::string_view cell_of(std::string_view line, char separator, std::size_t column) {
-  std::size_t at = 0;
-  for (std::size_t i = 0; i < column; ++i) {
-    at = line.find(separator, at);
-    if (at == std::string_view::npos) return {};
-    ++at;
-  }
-  return files::without_blanks(line.substr(at, std::min(line.find(separator, at), line.size()) - at));
+  const std::vector<std::string_view> cells = files::csv_cells(line, separator);
+  return column < cells.size() ? cells[column] : std::string_view();
 }
 
 /// Returns whether time `a` is before `b`; dates of one form are ordered as their texts are.
@@ -160,7 +154,7 @@ VehicleColumns prefixed_columns(const TableHeader& header) {
     if (called.size() != 1) continue;
     RawLog log;
     log.topics.emplace_back();
-    for (const std::string& name : *called.begin()) log.topics[0].columns.push_back({name, "", {}});
+    for (const std::string& name : *called.begin()) log.topics[0].columns.push_back({name, {}});
     const Recognition found = recognise(log, known_columns());
     if (found.find(kPosition) != nullptr || found.find(kVelocity) != nullptr) return vehicles;
   }
@@ -169,10 +163,8 @@ VehicleColumns prefixed_columns(const TableHeader& header) {
 
 bool may_hold_several(const std::string& path) {
   const std::string extension = std::filesystem::path(path).extension().string();
-  if ((extension != ".csv" && extension != ".CSV") || !std::filesystem::is_regular_file(path)) return false;
-  std::ifstream in(path, std::ios::binary);
-  const std::string head = format_head(in);
-  return format_of(head) == nullptr;
+  return (extension == ".csv" || extension == ".CSV") && std::filesystem::is_regular_file(path) &&
+         format_of_file(path) == nullptr;
 }
 
 std::string rows_of_vehicle(std::string_view text, const TableHeader& header, const VehicleColumn& by,

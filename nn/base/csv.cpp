@@ -15,7 +15,11 @@ std::string_view without_blanks(std::string_view text) {
 
 char csv_separator(std::string_view line, char otherwise) {
   for (const char separator : {',', ';', '\t'}) {
-    if (line.find(separator) != std::string_view::npos) return separator;
+    bool in_quotes = false;
+    for (const char c : line) {
+      in_quotes ^= c == '"';
+      if (c == separator && !in_quotes) return separator;
+    }
   }
   return otherwise;
 }

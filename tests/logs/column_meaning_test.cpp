@@ -199,12 +199,16 @@ TEST(ColumnMeaning, AQuaternionThatLaysTheVehicleOnItsSideHasTheOtherOrder) {
 }
 
 /// Returns a ULog of the flight as PX4 writes it, with the duties of an output driver beside the motor commands.
-std::string px4_flight(bool xy_valid, std::uint8_t vehicle_type, const std::string& parameters = "") {
+/// @param invalid records at the start whose x and y the estimator does not call valid
+/// @param dead_reckoning as the estimator says throughout
+std::string px4_flight(int invalid, std::uint8_t vehicle_type, const std::string& parameters = "",
+                       bool dead_reckoning = false) {
   std::string text =
       ulog_head() + ulog_flags(0, 0) + parameters +
       ulog_format(
           "vehicle_local_position:uint64_t timestamp;float x;float y;float z;float vx;float vy;"
-          "float vz;uint8_t xy_valid;uint8_t v_xy_valid;") +
+          "float vz;uint8_t xy_valid;uint8_t v_xy_valid;"
+          "uint8_t dead_reckoning;") +
       ulog_format("actuator_motors:uint64_t timestamp;float[4] control;") +
       ulog_format("px4io_status:uint64_t timestamp;uint16_t[8] pwm;") +
       ulog_format("vehicle_status:uint64_t timestamp;uint8_t vehicle_type;") +
@@ -220,7 +224,8 @@ std::string px4_flight(bool xy_valid, std::uint8_t vehicle_type, const std::stri
     const std::uint64_t time_us = 5'000'000 + 10'000 * static_cast<std::uint64_t>(k);
     text += ulog_record(
         1, time_us,
-        floats({f.x(), -f.y(), -f.z(), f.vx(), -f.vy(), -f.vz()}) + std::string(2, xy_valid ? '\1' : '\0'));
+        floats({f.x(), -f.y(), -f.z(), f.vx(), -f.vy(), -f.vz()}) + std::string(2, k < invalid ? '\0' : '\1') +
+            std::string(1, dead_reckoning ? '\1' : '\0'));
     text += ulog_record(2, time_us, floats({0.45, 0.45, 0.45, 0.45}));
     if (k % 100 != 0) continue;
     std::string pwm;
@@ -232,26 +237,39 @@ std::string px4_flight(bool xy_valid, std::uint8_t vehicle_type, const std::stri
 }
 
 TEST(ColumnMeaning, OfPx4TheMotorCommandsAreUsedAndNotTheStateOfAnOutputDriver) {
-  const logs::Log log = read(px4_flight(true, 1), "flight.ulg");
+  const logs::Log log = read(px4_flight(0, 1), "flight.ulg");
   EXPECT_NEAR(log.hover_command, 0.45, 0.01);
   EXPECT_TRUE(log.signals.force);
 }
 
 TEST(ColumnMeaning, WhatTheEstimatorCallsInvalidIsNotJudged) {
-  const logs::Log log = read(px4_flight(false, 1), "flight.ulg");
-  EXPECT_EQ(log.signals.force_axes, (std::array<bool, 3>{false, false, true}));
-  EXPECT_NE(fmt::format("{}", fmt::join(log.interpretation, "\n")).find("xy_valid = 0"), std::string::npos);
+  for (const auto& [text, why] : {std::pair{px4_flight(kRecords, 1), "xy_valid = 0"},
+                                  std::pair{px4_flight(0, 1, "", true), "dead_reckoning = 1"}}) {
+    const logs::Log log = read(text, "flight.ulg");
+    EXPECT_EQ(log.signals.force_axes, (std::array<bool, 3>{false, false, true})) << why;
+    EXPECT_NE(fmt::format("{}", fmt::join(log.interpretation, "\n")).find(why), std::string::npos) << why;
+  }
+}
+
+TEST(ColumnMeaning, RecordsThatTheEstimatorCallsInvalidForATimeAreLeftOutAndCountedAndNoDamage) {
+  const logs::Log log = read(px4_flight(120, 1), "flight.ulg");
+  ASSERT_EQ(log.left_out.size(), 1u);
+  EXPECT_EQ(log.left_out[0].name, "vehicle_local_position");
+  EXPECT_EQ(log.left_out[0].records, 120u);
+  EXPECT_EQ(log.samples.size(), static_cast<std::size_t>(kRecords - 120));
+  EXPECT_TRUE(log.signals.force_axes[0]);
+  EXPECT_TRUE(logs::is_sound(log.health));
 }
 
 TEST(ColumnMeaning, AFixedWingHasNoRotorsToJudge) {
-  const logs::Log log = read(px4_flight(true, 2), "flight.ulg");
+  const logs::Log log = read(px4_flight(0, 2), "flight.ulg");
   EXPECT_FALSE(log.signals.force);
   EXPECT_NE(log.signals.force_lacks.find("fixed wing"), std::string::npos) << log.signals.force_lacks;
 }
 
 TEST(ColumnMeaning, TheAirframeNamesTheKindOfAVehicleWithoutRotors) {
   const auto kind = [](std::uint8_t type, std::int32_t airframe) {
-    return read(px4_flight(true, type, ulog_keyed('P', "int32_t SYS_AUTOSTART", bytes_of(airframe))),
+    return read(px4_flight(0, type, ulog_keyed('P', "int32_t SYS_AUTOSTART", bytes_of(airframe))),
                 "flight.ulg")
         .signals.not_multirotor;
   };

@@ -49,8 +49,7 @@ TEST(Dataflash, ReadsTheFirstParametersAndMessages) {
   const logs::RawLog log = dataflash_of(small_dataflash());
   EXPECT_EQ(log.parameters, (std::map<std::string, double>{{"MOT_THST_HOVER", static_cast<double>(0.35f)}}));
   ASSERT_EQ(log.messages.size(), 1u);
-  EXPECT_EQ(log.messages[0].text, "ArduCopter V4");
-  EXPECT_EQ(log.messages[0].time_s, 3.2);
+  EXPECT_EQ(log.messages[0], "ArduCopter V4");
 }
 
 TEST(Dataflash, ReadsEveryTypeOfField) {
@@ -112,7 +111,7 @@ TEST(Dataflash, NamesWhatItCannotRead) {
   const logs::RawLog log = dataflash_of(bytes + dataflash_counts(3, 5));
   EXPECT_EQ(counts_in_dataflash(log), range(0, 5));
   std::map<std::string, std::size_t> records;
-  for (const logs::RawSkip& skip : log.skipped) records[skip.name] = skip.records;
+  for (const logs::LeftOut& skip : log.left_out) records[skip.name] = skip.records;
   EXPECT_EQ(records, (std::map<std::string, std::size_t>{{"message id 99", 6}, {"ODD", 3}, {"NOT", 3}}));
   EXPECT_EQ(log.health.damaged_blocks, 0u);
 }

@@ -93,7 +93,7 @@ logs::RawLog with_receiver(const std::string& topic, const std::vector<std::stri
   logs::RawLog raw;
   raw.topics.emplace_back();
   raw.topics[0].name = topic;
-  for (const std::string& name : names) raw.topics[0].columns.push_back({name, "", {}});
+  for (const std::string& name : names) raw.topics[0].columns.push_back({name, {}});
   for (const std::vector<double>& row : rows) {
     raw.topics[0].time_s.push_back(row[0]);
     for (std::size_t k = 0; k < names.size(); ++k) raw.topics[0].columns[k].values.push_back(row[k + 1]);

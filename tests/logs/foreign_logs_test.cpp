@@ -35,9 +35,9 @@ TEST(ForeignLogs, ABagOfAnotherWriterGivesItsNumbers) {
   EXPECT_EQ(log.format, "rosbag2 sqlite");
   EXPECT_EQ(log.health.damaged_blocks, 0u);
   EXPECT_EQ(log.health.records, 26u) << "six topics of four messages, two of which name two vehicles";
-  ASSERT_EQ(log.skipped.size(), 2u);
-  EXPECT_EQ(log.skipped[0].name, "/cf1/status");
-  EXPECT_EQ(log.skipped[1].name, "/cf1/joint");
+  ASSERT_EQ(log.left_out.size(), 2u);
+  EXPECT_EQ(log.left_out[0].name, "/cf1/status");
+  EXPECT_EQ(log.left_out[1].name, "/cf1/joint");
   const auto number = [](int k) { return static_cast<double>(k); };
   const auto zero = [](int) { return 0.0; };
   expect_column(log, "/cf1/pose", "pose.position.x", number);
@@ -125,7 +125,7 @@ logs::RawTopic px4_topic(const std::string& name, int instance, const std::vecto
   topic.instance = instance;
   for (int k = 0; k < 200; ++k) topic.time_s.push_back(10 + 0.02 * k);
   for (std::size_t c = 0; c < columns.size(); ++c) {
-    topic.columns.push_back({columns[c], "", {}});
+    topic.columns.push_back({columns[c], {}});
     for (int k = 0; k < 200; ++k) topic.columns.back().values.push_back(value(c, k));
   }
   return topic;

@@ -80,9 +80,9 @@ TEST(LogTraps, GroupsAtDifferentRatesShareOneClock) {
   for (const char* const name :
        {"stateEstimate.x", "stateEstimate.y", "stateEstimate.z", "stateEstimate.vx", "stateEstimate.vy",
         "stateEstimate.vz", "pwm.m1_pwm", "pwm.m2_pwm", "pwm.m3_pwm", "pwm.m4_pwm"})
-    motion.columns.push_back({name, "", {}});
+    motion.columns.push_back({name, {}});
   battery.name = "slow";
-  battery.columns.push_back({"pm.vbat", "", {}});
+  battery.columns.push_back({"pm.vbat", {}});
   for (int k = 0; k < 2000; ++k) {
     const double t = 0.002 * k;
     const Bob bob(t);

@@ -50,8 +50,8 @@ TEST(Mcap, ReadsWhatTheReferenceWriterWrote) {
     EXPECT_EQ(log.health.records, 36u);
     EXPECT_EQ(log.health.damaged_blocks, 0u);
     EXPECT_FALSE(log.health.truncated || log.health.checksum_failed);
-    ASSERT_EQ(log.skipped.size(), 1u);
-    EXPECT_EQ(log.skipped[0].name, "/json");
+    ASSERT_EQ(log.left_out.size(), 1u);
+    EXPECT_EQ(log.left_out[0].name, "/json");
     EXPECT_EQ(poses_in_mcap(log), range(0, 12));
     const logs::RawTopic& mixed = topic_of(log, "/mixed");
     for (int k = 0; k < 12; ++k) {
@@ -82,8 +82,8 @@ TEST(Mcap, AChunkThatFailsItsChecksumIsLeftOut) {
   EXPECT_EQ(poses_in_mcap(log), range(0, 12));
   EXPECT_EQ(log.health.damaged_blocks, 1u);
   EXPECT_TRUE(log.health.checksum_failed) << "that of the data section covers the chunk";
-  ASSERT_EQ(log.skipped.size(), 1u);
-  EXPECT_NE(log.skipped[0].why.find("checksum"), std::string::npos);
+  ASSERT_EQ(log.left_out.size(), 1u);
+  EXPECT_NE(log.left_out[0].why.find("checksum"), std::string::npos);
 }
 
 TEST(Mcap, DefinitionsOfADamagedChunkAreTakenFromElsewhere) {
@@ -145,7 +145,7 @@ TEST(Mcap, NamesTopicsThatItCannotRead) {
       mcap_message(7, 1, "x") + mcap_chunk("some", "xz", "some") + mcap_poses(0, 2)));
   EXPECT_EQ(poses_in_mcap(log), range(0, 2));
   std::map<std::string, std::string> why;
-  for (const logs::RawSkip& skip : log.skipped) why[skip.name] = skip.why;
+  for (const logs::LeftOut& skip : log.left_out) why[skip.name] = skip.why;
   EXPECT_NE(why["/json"].find("encoding"), std::string::npos);
   EXPECT_NE(why["/no_schema"].find("lost the definition"), std::string::npos);
   EXPECT_NE(why["/odd"].find("cannot be used"), std::string::npos);

@@ -22,10 +22,9 @@ inline std::string broken_rule(const logs::RawLog& log) {
       if (!columns.insert(column.name).second) return "two columns of one name: " + column.name;
     }
   }
-  for (const logs::RawDropout& dropout : log.dropouts)
-    if (!(dropout.duration_s >= 0)) return "a dropout of negative duration";
-  for (const logs::RawSkip& skip : log.skipped)
-    if (skip.name.empty() || skip.why.empty()) return "something skipped without name or reason";
+  if (!(log.health.dropouts_s >= 0)) return "a dropout of negative duration";
+  for (const logs::LeftOut& skip : log.left_out)
+    if (skip.name.empty() || skip.why.empty()) return "something left out without name or reason";
   return "";
 }
 

@@ -20,7 +20,7 @@ logs::RawLog messages_of(const std::string& type, const std::string& definition,
   std::string fault;
   const auto layout = logs::ros_layout(type, definition, fault);
   if (!layout) {
-    log.skipped.push_back({"/t", fault, messages.size()});
+    log.left_out.push_back({"/t", fault, messages.size()});
     return log;
   }
   logs::RosBudget budget;
@@ -55,7 +55,7 @@ TEST(RosTopic, UnderstandsTheLanguageOfDefinitions) {
   const std::string definition =
       "# a comment\n\nuint8 CONSTANT=3\nstring WORDS = \"a # b\"\nfloat64 TAU=6.28 # another\n"
       "int32 a 5 # with a default\nint32[2] b [1, 2]\nint32[<=3] c\nstring<=9 d 'text'\nstring<=9[<=2] e\n"
-      "\tbool  f   true\r\nbyte g\nchar h\nHeader header\nInner inner\nother/msg/Inner outer\n"
+      "\tbool  f   true\r\nbyte g\nchar h\nstd_msgs/Header header\nInner inner\nother/msg/Inner outer\n"
       "=====\nMSG: p/Inner\nuint8 x\n=====\nMSG: other/Inner\nuint16 y\n";
   CdrWriter writer;
   writer.number(std::int32_t{-1})
@@ -72,7 +72,7 @@ TEST(RosTopic, UnderstandsTheLanguageOfDefinitions) {
       .number(std::uint8_t{9});
   writer.header(3, 500'000'000, "map").number(std::uint8_t{10}).number(std::uint16_t{11});
   const logs::RawLog log = messages_of("p/msg/T", definition, {writer.message()});
-  ASSERT_TRUE(log.skipped.empty()) << log.skipped[0].why;
+  ASSERT_TRUE(log.left_out.empty()) << log.left_out[0].why;
   const logs::RawTopic& topic = topic_of(log, "/t");
   EXPECT_EQ(column_names(topic), (std::vector<std::string>{"a", "b[0]", "b[1]", "c[0]", "f", "g", "h",
                                                            "header.stamp", "inner.x", "outer.y"}));
@@ -98,8 +98,8 @@ TEST(RosTopic, RefusesDefinitionsThatCannotBe) {
   };
   for (const auto& [definition, reason] : cases) {
     const logs::RawLog log = messages_of("p/T", definition, {"message"});
-    ASSERT_EQ(log.skipped.size(), 1u) << reason;
-    EXPECT_NE(log.skipped[0].why.find(reason), std::string::npos) << log.skipped[0].why;
+    ASSERT_EQ(log.left_out.size(), 1u) << reason;
+    EXPECT_NE(log.left_out[0].why.find(reason), std::string::npos) << log.left_out[0].why;
   }
 }
 
@@ -109,8 +109,8 @@ TEST(RosTopic, NestingIsLimited) {
     definition += "===\nMSG: p/T" + std::to_string(i) + "\nT" + std::to_string(i + 1) + " x\n";
   definition += "===\nMSG: p/T40\nuint8 x\n";
   const logs::RawLog log = messages_of("p/T", definition, {"message"});
-  ASSERT_EQ(log.skipped.size(), 1u);
-  EXPECT_NE(log.skipped[0].why.find("nested too deeply"), std::string::npos) << log.skipped[0].why;
+  ASSERT_EQ(log.left_out.size(), 1u);
+  EXPECT_NE(log.left_out[0].why.find("nested too deeply"), std::string::npos) << log.left_out[0].why;
 }
 
 TEST(RosTopic, ArraysThatVaryInLengthAreNotANumberWhereTheyLackAnElement) {
@@ -188,7 +188,7 @@ TEST(RosTopic, TakesTheVersionOfAMessageWhoseSizeItHas) {
       is_double ? writer.number(1.0 * i) : writer.number(1.0f * static_cast<float>(i));
     const logs::RawLog log = messages_of("crazyflie_interfaces/msg/LogDataGeneric", "", {writer.message()});
     EXPECT_EQ(values_in(log, "/t", "values[2]"), std::vector<double>{2}) << is_double;
-    EXPECT_TRUE(log.skipped.empty());
+    EXPECT_TRUE(log.left_out.empty());
   }
 }
 
@@ -213,8 +213,8 @@ TEST(RosTopic, MessagesOfAnotherSizeThanTheirDefinitionAreCountedNotRead) {
   const logs::RawLog log = messages_of("p/T", "float64 x\nfloat64 y\n", messages);
   EXPECT_EQ(values_in(log, "/t", "y"), (std::vector<double>{2, 2}));
   EXPECT_EQ(log.health.damaged_blocks, odd.size());
-  ASSERT_EQ(log.skipped.size(), 1u);
-  EXPECT_EQ(log.skipped[0].records, odd.size());
+  ASSERT_EQ(log.left_out.size(), 1u);
+  EXPECT_EQ(log.left_out[0].records, odd.size());
 }
 
 TEST(RosTopic, CountsOfArraysAreNotBelieved) {
@@ -235,8 +235,8 @@ TEST(RosTopic, LargeArraysAreNamedAndTheRestOfTheMessageIsRead) {
   writer.number(2.5);
   const logs::RawLog log = messages_of("p/Image", "uint8[] data\nfloat64 x\n", {writer.message()});
   EXPECT_EQ(column_names(topic_of(log, "/t")), std::vector<std::string>{"x"});
-  ASSERT_EQ(log.skipped.size(), 1u);
-  EXPECT_EQ(log.skipped[0].name, "/t.data");
+  ASSERT_EQ(log.left_out.size(), 1u);
+  EXPECT_EQ(log.left_out[0].name, "/t.data");
 }
 
 TEST(RosTopic, OneLongMessageAmongManyShortOnesIsGivenUp) {
@@ -248,8 +248,8 @@ TEST(RosTopic, OneLongMessageAmongManyShortOnesIsGivenUp) {
   messages[0] = large.message();
   const logs::RawLog log = messages_of("p/T", "uint8[] data\n", messages);
   EXPECT_TRUE(log.topics.empty());
-  ASSERT_EQ(log.skipped.size(), 1u);
-  EXPECT_EQ(log.skipped[0].records, 3000u);
+  ASSERT_EQ(log.left_out.size(), 1u);
+  EXPECT_EQ(log.left_out[0].records, 3000u);
 }
 
 TEST(RosTopic, EveryBuiltinDefinitionCanBeUsed) {

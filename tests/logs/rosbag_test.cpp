@@ -6,10 +6,12 @@
 #include <sstream>
 
 #include "analysis/logs/formats/formats.h"
+#include "analysis/logs/read_log.h"
 #include "logs/mcap_writer.h"
 #include "logs/raw_log_invariant.h"
 #include "logs/rosbag_writer.h"
 #include "logs/topics.h"
+#include "nn/base/file_io.h"
 #include "nn/refusal.h"
 
 namespace swarmcert::tests {
@@ -84,12 +86,12 @@ TEST(RosbagSqlite, NamesTopicsThatItCannotRead) {
                              rosbag_message(2, 1, "x") + rosbag_message(2, 2, "x") +
                              rosbag_message(3, 1, "{}") + rosbag_message(9, 1, "x") + rosbag_poses(0, 2)));
   EXPECT_EQ(poses_in_rosbag(log), range(0, 2));
-  ASSERT_EQ(log.skipped.size(), 3u);
-  EXPECT_EQ(log.skipped[0].name, "/odd");
-  EXPECT_NE(log.skipped[0].why.find("odd/msg/Odd"), std::string::npos);
-  EXPECT_EQ(log.skipped[0].records, 2u);
-  EXPECT_EQ(log.skipped[1].name, "/json");
-  EXPECT_EQ(log.skipped[2].name, "messages without topic");
+  ASSERT_EQ(log.left_out.size(), 3u);
+  EXPECT_EQ(log.left_out[0].name, "/odd");
+  EXPECT_NE(log.left_out[0].why.find("odd/msg/Odd"), std::string::npos);
+  EXPECT_EQ(log.left_out[0].records, 2u);
+  EXPECT_EQ(log.left_out[1].name, "/json");
+  EXPECT_EQ(log.left_out[2].name, "messages without topic");
 }
 
 TEST(RosbagSqlite, ReadsMessagesThatWereCompressedOneByOne) {
@@ -106,14 +108,49 @@ TEST(RosbagSqlite, ReadsADatabaseThatWasWrittenWithAWriteAheadLog) {
   EXPECT_EQ(poses_in_rosbag(rosbag_of(bytes)), range(0, 20));
 }
 
-TEST_F(RosbagFolder, AJournalThatWasNotAppliedIsNamed) {
+/// A recorder that is killed leaves its last transactions in the journal of the database.
+TEST_F(RosbagFolder, WhatAKilledRecorderLeftInTheJournalIsRead) {
+  write("live.db3", small_rosbag());
+  sqlite3* recorder = nullptr;
+  ASSERT_EQ(sqlite3_open((folder_ / "live.db3").c_str(), &recorder), SQLITE_OK);
+  const auto run = [&](const std::string& statements) {
+    EXPECT_EQ(sqlite3_exec(recorder, statements.c_str(), nullptr, nullptr, nullptr), SQLITE_OK);
+  };
+  run("PRAGMA journal_mode=WAL;PRAGMA wal_autocheckpoint=0;");
+  for (int k = 20; k < 60; k += 10) run("BEGIN;" + rosbag_poses(k, k + 10) + "COMMIT;");
+  const std::string journal = files::read_file((folder_ / "live.db3-wal").string());
+  write("bag.db3", files::read_file((folder_ / "live.db3").string()));
+  sqlite3_close(recorder);
+  const auto read_with = [&](const std::string& bytes) {
+    write("bag.db3-wal", bytes);
+    return logs::read_raw((folder_ / "bag.db3").string());
+  };
+  const logs::RawLog whole = read_with(journal);
+  EXPECT_EQ(poses_in_rosbag(whole), range(0, 60));
+  EXPECT_GT(whole.health.repaired.journal_pages, 0u);
+  EXPECT_TRUE(logs::completeness_of(whole.health) == logs::Completeness::kComplete);
+  EXPECT_TRUE(whole.left_out.empty());
+  // Cut or damaged anywhere: the transactions before are read, as SQLite reads them.
+  for (std::size_t size = 0; size < journal.size(); size += 97) {
+    std::string damaged = journal;
+    damaged[size] = static_cast<char>(damaged[size] ^ 0x40);
+    for (const std::string& bytes : {journal.substr(0, size), damaged}) {
+      const std::vector<double> poses = poses_in_rosbag(read_with(bytes));
+      EXPECT_EQ(poses.size() % 10, 0u) << size;
+      EXPECT_GE(poses.size(), 20u) << size;
+      EXPECT_EQ(poses, range(0, static_cast<int>(poses.size()))) << size;
+    }
+  }
+}
+
+TEST_F(RosbagFolder, AJournalOfAnotherFormIsNamed) {
   write("bag.db3-wal", "what the recorder wrote last");
   write("bag.db3", small_rosbag());
   const logs::RawLog log = logs::read_raw((folder_ / "bag.db3").string());
   EXPECT_EQ(poses_in_rosbag(log), range(0, 20));
   EXPECT_TRUE(log.health.truncated);
-  ASSERT_EQ(log.skipped.size(), 1u);
-  EXPECT_NE(log.skipped[0].why.find("wal_checkpoint"), std::string::npos);
+  ASSERT_EQ(log.left_out.size(), 1u);
+  EXPECT_NE(log.left_out[0].name.find("bag.db3-wal"), std::string::npos);
   int files = 0;
   for ([[maybe_unused]] const auto& entry : fs::directory_iterator(folder_)) ++files;
   EXPECT_EQ(files, 2) << "reading creates nothing";
@@ -216,9 +253,9 @@ TEST_F(RosbagFolder, APartThatIsMissingIsNamed) {
   const logs::RawLog log = logs::read_raw(folder_.string());
   EXPECT_EQ(poses_in_rosbag(log), range(0, 20));
   EXPECT_TRUE(log.health.truncated);
-  ASSERT_EQ(log.skipped.size(), 2u);
-  EXPECT_EQ(log.skipped[0].name, "bag_1.db3");
-  EXPECT_EQ(log.skipped[1].name, "passwd") << "looked for in the folder only";
+  ASSERT_EQ(log.left_out.size(), 2u);
+  EXPECT_EQ(log.left_out[0].name, "bag_1.db3");
+  EXPECT_EQ(log.left_out[1].name, "passwd") << "looked for in the folder only";
 }
 
 TEST_F(RosbagFolder, RefusesAFolderWithoutAFileThatCanBeRead) {

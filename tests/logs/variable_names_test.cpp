@@ -32,7 +32,7 @@ TEST(ColumnNames, EveryRowOfTheTableIsASignalByItself) {
     topic.time_s = {0, 0.01, 0.02};
     std::vector<std::string> notes;
     if (row.origin == logs::Origin::kMessages) topic.type = "sensor_msgs/msg/Imu";
-    for (const std::string& name : row.names) topic.columns.push_back({name, "", {0.5, 0.5, 0.5}});
+    for (const std::string& name : row.names) topic.columns.push_back({name, {0.5, 0.5, 0.5}});
     if (row.origin == logs::Origin::kFirmware) {
       log.format = row.program == "px4" ? "ulog" : row.program;
       topic.name = row.message;
@@ -76,7 +76,7 @@ TEST(ColumnNames, AUnitBehindTheNameCountsOnlyForSignalsOfThatUnit) {
     logs::RawLog log;
     log.topics.emplace_back();
     log.topics.back().time_s = {0, 0.01, 0.02};
-    for (const std::string& name : names) log.topics.back().columns.push_back({name, "", {0.5, 0.5, 0.5}});
+    for (const std::string& name : names) log.topics.back().columns.push_back({name, {0.5, 0.5, 0.5}});
     return logs::recognise(log, logs::known_columns());
   };
   const logs::Recognition speeds = recognised({"x_mm_s", "y_mm_s", "z_mm_s"});

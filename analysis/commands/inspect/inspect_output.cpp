@@ -111,7 +111,8 @@ std::string completeness_in_words(const LogFile& file) {
   for (const auto& [count, what] : {std::pair(repaired.unsorted_rows, "unsorted rows"),
                                     std::pair(repaired.repeated_rows, "repeated rows"),
                                     std::pair(repaired.unwrapped_clocks, "wraps of the clock"),
-                                    std::pair(repaired.merged_blocks, "log blocks of other rates")})
+                                    std::pair(repaired.merged_blocks, "log blocks of other rates"),
+                                    std::pair(repaired.journal_pages, "pages from the journal")})
     if (count > 0) list += fmt::format("{}{} {}", list.empty() ? "; repaired: " : ", ", count, what);
   return words + list;
 }
@@ -175,6 +176,7 @@ std::vector<Table> tables_on(const files::Node& log) {
                        {"runner_up", "against"},
                        {"from"}}),
       rows("missing", {{"for", "to judge"}, {"signal", "the log lacks"}, {"log_this", "log next time"}}),
+      rows("left_out", {{"name", "left out"}, {"records"}, {"why"}}),
       rows("phases", {{"phase"}, {"start_s", "from", "{:.2f}"}, {"end_s", "to", "{:.2f}"}}),
       rows("events", {{"event"}, {"time_s", "at", "{:.2f}"}, {"duration_s", "for", "{:.3f}"}, {"what"}})};
   std::vector<std::vector<std::string>>& events = tables.back().rows;

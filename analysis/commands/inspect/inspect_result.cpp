@@ -169,6 +169,14 @@ void describe_repaired(Record& record, const logs::Repaired& repaired) {
                "Same time and values as another one, which is kept.");
   record.field("unwrapped_clocks", repaired.unwrapped_clocks, "Wraps of a counter or a time of day.");
   record.field("merged_blocks", repaired.merged_blocks, "Log blocks of other rates than the records.");
+  record.field("journal_pages", repaired.journal_pages,
+               "Pages that a recorder left in the journal of its database (-wal).");
+}
+
+void describe_left_out(Record& record, const logs::LeftOut& left_out) {
+  record.field("name", left_out.name, "Of the topic, message or field.");
+  record.field("records", left_out.records, "Number left out; 0: a part of each.");
+  record.field("why", left_out.why, "In words.");
 }
 
 void describe_health(Record& record, const logs::LogHealth& health) {
@@ -329,6 +337,7 @@ void describe(Record& record, const LogFile& file) {
                "pauses in which the vehicle could not write, and the rest is sound.");
   record.field("lost_share", file.lost_share, "Of the records; null: it cannot be counted.");
   record.object("repaired", "Without loss.", [&](Record& r) { describe_repaired(r, log.health.repaired); });
+  record.list("left_out", log.left_out, "What the reader of the format did not pass on.", describe_left_out);
   record.object("health", "Damage, which is skipped and counted.",
                 [&](Record& r) { describe_health(r, log.health); });
   record.field("plausibility", file.doubts, "Values that no flight has.");

@@ -14,10 +14,9 @@
 
 #include "analysis/logs/formats/ros_types.h"
 #include "analysis/logs/raw_log.h"
+#include "analysis/logs/statistics_of_series.h"
 
 namespace swarmcert::logs {
-
-inline constexpr double kNoValue = std::numeric_limits<double>::quiet_NaN();
 
 /// Layouts, and limits of the memory, of all topics of a log together; compressed files can hold far more than their
 /// size suggests.
@@ -34,7 +33,6 @@ struct RosNode {
   const RosNode* parent = nullptr;
   std::string label;  ///< ".x", "[3]"
   std::optional<std::size_t> column;
-  bool is_stamp = false;
   std::vector<std::unique_ptr<RosNode>> children;
 
   std::string name() const {
@@ -88,7 +86,7 @@ class ColumnTable {
       if (*node->column < topic_.columns.size()) topic_.columns[*node->column].values.push_back(value);
     }
     for (RawColumn& column : topic_.columns)
-      if (column.values.size() == row) column.values.push_back(kNoValue);
+      if (column.values.size() == row) column.values.push_back(kNaN);
     limit_values();
   }
 
@@ -96,11 +94,11 @@ class ColumnTable {
   /// @param has_elements part of the messages went to topics of its own, so this topic may be empty
   void move_to(RawLog& log, bool has_elements) {
     if (!given_up_.empty()) {
-      log.skipped.push_back({topic_.name, given_up_, records_});
+      log.left_out.push_back({topic_.name, given_up_, records_});
       return;
     }
     if (has_too_many_columns_)
-      log.skipped.push_back(
+      log.left_out.push_back(
           {topic_.name, fmt::format("only its first {} numbers are kept", topic_.columns.size()), 0});
     if (topic_.time_s.empty() || (has_elements && topic_.columns.empty())) return;
     log.health.records += topic_.time_s.size();
@@ -116,7 +114,7 @@ class ColumnTable {
       has_too_many_columns_ = true;
       return std::numeric_limits<std::size_t>::max();
     }
-    topic_.columns.push_back({node.name(), node.is_stamp ? "s" : "", std::vector<double>(row, kNoValue)});
+    topic_.columns.push_back({node.name(), std::vector<double>(row, kNaN)});
     return topic_.columns.size() - 1;
   }
 

@@ -1,13 +1,13 @@
 /// @file ArduPilot dataflash logs (`.bin`).
 ///
 /// Reads a log. Topics are named after their message ("XKF1", "ATT", "RCOU", "BAT", "MOTB"); a field that the log
-/// declares as the instance becomes RawTopic::instance. Times come from `TimeUS` or `TimeMS`. Values have the units
-/// stated in the log (UNIT), with its multipliers (MULT) and those of the number types (centidegrees to degrees, 1e-7
-/// degrees to degrees) applied. Parameters are the first values in PARM. MSG gives the messages.
-/// If no message follows, the reader searches for the next two consecutive messages and counts the damaged place and
-/// the skipped bytes.
+/// declares as the instance becomes RawTopic::instance. Times come from `TimeUS` or `TimeMS`. The multipliers of the log
+/// (MULT) and those of the number types (centidegrees to degrees, 1e-7 degrees to degrees) are applied. Parameters are
+/// the first values in PARM. MSG gives the messages. If no message follows, the reader searches for the next two
+/// consecutive messages and counts the damaged place and the skipped bytes.
 #include <fmt/core.h>
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -28,17 +28,15 @@ constexpr std::size_t kDataflashHead_bytes = 3;  ///< of each message: two fixed
 struct FieldType {
   std::optional<Scalar> number;  ///< empty: text or a 16-bit float
   std::size_t bytes = 0;
-  std::size_t count = 1;
   double scale = 1;  ///< factor for the stored value
+  std::size_t count = 1;
   bool is_text = false;
 };
 
 struct DataflashField {
   std::string name;
-  char letter;
   FieldType type;
   std::size_t offset;  ///< from the end of the message's header
-  std::string unit;
   bool is_instance = false;
 };
 struct DataflashFormat {
@@ -54,48 +52,23 @@ struct DataflashFormat {
 };
 
 std::optional<FieldType> field_type(char letter) {
-  const auto number = [](Scalar type, double scale = 1, std::size_t count = 1) {
-    return FieldType{type, count * size_of(type), count, scale, false};
-  };
-  const auto text = [](std::size_t bytes) { return FieldType{std::nullopt, bytes, 1, 1, true}; };
-  switch (letter) {
-    case 'a':
-      return number(Scalar::kInt16, 1, 32);
-    case 'M':
-      return number(Scalar::kUint8);
-    case 'g':
-      return FieldType{std::nullopt, 2, 1, 1, false};
-    case 'c':
-      return number(Scalar::kInt16, 0.01);
-    case 'C':
-      return number(Scalar::kUint16, 0.01);
-    case 'e':
-      return number(Scalar::kInt32, 0.01);
-    case 'E':
-      return number(Scalar::kUint32, 0.01);
-    case 'L':
-      return number(Scalar::kInt32, 1e-7);
-    case 'n':
-      return text(4);
-    case 'N':
-      return text(16);
-    case 'Z':
-      return text(64);
-    default:
-      break;
-  }
+  static const std::map<char, FieldType> special = {
+      {'a', {Scalar::kInt16, 64, 1, 32}},   {'M', {Scalar::kUint8, 1}},
+      {'c', {Scalar::kInt16, 2, 0.01}},     {'C', {Scalar::kUint16, 2, 0.01}},
+      {'e', {Scalar::kInt32, 4, 0.01}},     {'E', {Scalar::kUint32, 4, 0.01}},
+      {'L', {Scalar::kInt32, 4, 1e-7}},     {'g', {std::nullopt, 2}},
+      {'n', {std::nullopt, 4, 1, 1, true}}, {'N', {std::nullopt, 16, 1, 1, true}},
+      {'Z', {std::nullopt, 64, 1, 1, true}}};
+  const auto found = special.find(letter);
+  if (found != special.end()) return found->second;
   const std::optional<Scalar> plain = scalar_of_letter(letter);
-  return plain ? std::optional(number(*plain)) : std::nullopt;
+  return plain ? std::optional(FieldType{plain, size_of(*plain)}) : std::nullopt;
 }
 
 /// Returns the IEEE 754 binary16 number at `bytes`.
 double half_float(const char* bytes) {
-  const auto bits = static_cast<unsigned>(value_of(Scalar::kUint16, bytes));
-  const int exponent = static_cast<int>(bits >> 10 & 31);
-  const double fraction = bits & 1023;
-  const double sign = (bits & 0x8000) != 0 ? -1 : 1;
-  if (exponent == 31) return fraction == 0 ? sign * INFINITY : NAN;
-  return sign * (exponent == 0 ? std::ldexp(fraction, -24) : std::ldexp(1024 + fraction, exponent - 25));
+  const auto bits = static_cast<std::uint16_t>(value_of(Scalar::kUint16, bytes));
+  return Eigen::half_impl::half_to_float(Eigen::half_impl::raw_uint16_to_half(bits));
 }
 
 /// Parses field types ("QBff") and names ("TimeUS,I,AccX,AccY"). Returns nothing if they contradict each other or
@@ -110,7 +83,7 @@ std::vector<DataflashField> parse_fields(const std::string& letters, const std::
     const std::string name = begin < names.size() ? names.substr(begin, end - begin) : "";
     const std::optional<FieldType> type = field_type(letter);
     if (!type || !is_identifier(name) || !seen.insert(name).second) return {};
-    fields.push_back({name, letter, *type, offset, "", false});
+    fields.push_back({name, *type, offset});
     offset += type->bytes;
     begin = end + 1;
   }
@@ -206,8 +179,6 @@ class DataflashReader {
     const DataflashFormat& format = formats_[id];
     if (format.name == "FMTU")
       take_unit_ids(format, body);
-    else if (format.name == "UNIT")
-      units_.emplace(letter_in(format, body, "Id"), text_in(format, body, "Label"));
     else if (format.name == "MULT")
       multipliers_.emplace(letter_in(format, body, "Id"), number_in(format, body, "Mult"));
   }
@@ -260,13 +231,9 @@ class DataflashReader {
         DataflashField& field = formats_[id].fields[i];
         const char unit = i < units.size() ? units[i] : '-';
         const char multiplier = i < multipliers.size() ? multipliers[i] : '-';
-        const auto found_unit = units_.find(unit);
         // Files without FMTU mark instances only by the names that ArduPilot gives these fields in LogStructure.h.
         const bool is_called_instance = field.name == "I" || field.name == "C" || field.name == "Inst";
         field.is_instance = (unit == '#' || (units.empty() && is_called_instance)) && field.type.number;
-        // "-" means none, "?" means unknown.
-        if (found_unit != units_.end() && unit != '-' && unit != '?' && !field.is_instance)
-          field.unit = found_unit->second;
         const auto found = multipliers_.find(multiplier);
         const bool has_own_scale = field.type.scale != 1;
         if (found != multipliers_.end() && !has_own_scale && found->second > 0 &&
@@ -289,12 +256,8 @@ class DataflashReader {
     const DataflashFormat& format = formats_[id];
     if (id == kFormatId || format.name == "FMTU" || format.name == "UNIT" || format.name == "MULT") return;
     const std::optional<double> time_s = time_of(format, body);
-    if (time_s) last_time_s_ = *time_s;
     if (format.name == "PARM") return take_parameter(format, body);
-    if (format.name == "MSG") {
-      log_.messages.push_back({last_time_s_, text_in(format, body, "Message")});
-      return;
-    }
+    if (format.name == "MSG") return log_.messages.push_back(text_in(format, body, "Message"));
     if (format.fields.empty() || !time_s) {
       ++left_out_[{format.name, format.fields.empty() ? "the definition of its format contradicts itself"
                                                       : "it has no field \"TimeUS\" or \"TimeMS\""}];
@@ -341,7 +304,7 @@ class DataflashReader {
       if (field.type.is_text || is_time(field)) continue;
       for (std::size_t i = 0; i < field.type.count; ++i) {
         const std::string suffix = field.type.count > 1 ? "[" + std::to_string(i) + "]" : "";
-        topic.columns.push_back({field.name + suffix, field.unit, {}});
+        topic.columns.push_back({field.name + suffix, {}});
       }
     }
     log_.topics.push_back(std::move(topic));
@@ -356,22 +319,20 @@ class DataflashReader {
 
   void finish() {
     log_.health.damaged_blocks += damaged_formats_;
-    for (const auto& [what, count] : left_out_) log_.skipped.push_back({what.first, what.second, count});
+    for (const auto& [what, count] : left_out_) log_.left_out.push_back({what.first, what.second, count});
   }
 
   const std::string_view bytes_;
   const std::string path_;
   RawLog log_;
   std::array<DataflashFormat, 256> formats_;
-  /// Units and multipliers of a format's fields.
+  /// Letters of the units and multipliers of a format's fields.
   std::array<std::pair<std::string, std::string>, 256> unit_ids_;
-  std::map<char, std::string> units_;
   std::map<char, double> multipliers_;
   std::map<std::pair<std::uint8_t, int>, std::size_t> topics_;  ///< index in log_.topics
   std::map<std::string, std::uint8_t> names_;
   std::map<std::pair<std::string, std::string>, std::size_t> left_out_;  ///< messages by name and reason
   std::size_t damaged_formats_ = 0;
-  double last_time_s_ = NAN;
 };
 
 }  // namespace

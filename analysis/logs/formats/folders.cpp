@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
-#include <limits>
 #include <optional>
 #include <regex>
 #include <sstream>
@@ -13,6 +12,8 @@
 #include "analysis/logs/formats/bytes.h"
 #include "analysis/logs/formats/decompress.h"
 #include "analysis/logs/formats/formats.h"
+#include "analysis/logs/statistics_of_series.h"
+#include "analysis/logs/variable_names.h"
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
 
@@ -21,20 +22,19 @@ namespace {
 
 /// Appends the records of `more` to `topic`; columns that only one of them has are NaN in the other.
 void append(RawTopic& topic, RawTopic& more) {
-  constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
   const std::size_t before = topic.time_s.size();
   topic.time_s.insert(topic.time_s.end(), more.time_s.begin(), more.time_s.end());
   for (RawColumn& column : more.columns) {
     const auto same = std::find_if(topic.columns.begin(), topic.columns.end(),
                                    [&](const RawColumn& candidate) { return candidate.name == column.name; });
     if (same == topic.columns.end()) {
-      column.values.insert(column.values.begin(), before, kMissing);
+      column.values.insert(column.values.begin(), before, kNaN);
       topic.columns.push_back(std::move(column));
     } else {
       same->values.insert(same->values.end(), column.values.begin(), column.values.end());
     }
   }
-  for (RawColumn& column : topic.columns) column.values.resize(topic.time_s.size(), kMissing);
+  for (RawColumn& column : topic.columns) column.values.resize(topic.time_s.size(), kNaN);
 }
 
 void append(LogHealth& health, const LogHealth& more) {
@@ -42,6 +42,10 @@ void append(LogHealth& health, const LogHealth& more) {
   health.damaged_blocks += more.damaged_blocks;
   health.skipped_bytes += more.skipped_bytes;
   health.bytes += more.bytes;
+  health.damaged_lines += more.damaged_lines;
+  health.dropouts_s += more.dropouts_s;
+  health.repaired.merged_blocks += more.repaired.merged_blocks;
+  health.repaired.journal_pages += more.repaired.journal_pages;
   health.truncated |= more.truncated;
   health.checksum_failed |= more.checksum_failed;
 }
@@ -53,20 +57,10 @@ constexpr std::size_t kLargestMetadata_bytes = std::size_t{1} << 20;
 /// Returns the file names listed below `relative_file_paths:`, without their folders.
 std::vector<std::string> listed_files(const std::string& metadata) {
   std::vector<std::string> names;
-  bool is_in_list = false;
-  for (std::size_t at = 0; at < metadata.size();) {
-    std::string line(take_text_line(metadata, at));
-    while (!line.empty() && line.back() == ' ') line.pop_back();
-    const std::size_t first = line.find_first_not_of(' ');
-    if (first == std::string::npos) continue;
-    const bool is_item = line.compare(first, 2, "- ") == 0;
-    if (is_in_list && is_item) {
-      std::string name = line.substr(first + 2);
-      if (name.size() >= 2 && (name[0] == '"' || name[0] == '\'')) name = name.substr(1, name.size() - 2);
-      names.push_back(fs::path(name).filename().string());
-    }
-    is_in_list = is_item ? is_in_list : line.compare(first, 20, "relative_file_paths:") == 0;
-  }
+  for_each_value(metadata, [&](const std::vector<std::string>& keys, const std::string& value) {
+    if (!keys.empty() && keys.back() == "relative_file_paths")
+      names.push_back(fs::path(value).filename().string());
+  });
   return names;
 }
 
@@ -78,9 +72,7 @@ std::string metadata_of(const std::string& folder) {
 RawLog read_part(const fs::path& path) {
   const std::string extension = path.extension().string();
   if (extension != ".zstd" && extension != ".zst") return read_raw(path.string());
-  std::ifstream in(path, std::ios::binary);
-  if (!in)
-    throw files::InputError({path.string(), "", "", "", "cannot be read", "check its name and permissions"});
+  std::ifstream in = open_log(path.string());
   const std::string compressed = read_all(in, path.string());
   const Decompressed content =
       decompress(Compression::kZstd, compressed, decompression_limit(compressed.size()));
@@ -122,7 +114,7 @@ void append(RawLog& log, RawLog&& more) {
     else
       append(*same, topic);
   }
-  log.skipped.insert(log.skipped.end(), more.skipped.begin(), more.skipped.end());
+  log.left_out.insert(log.left_out.end(), more.left_out.begin(), more.left_out.end());
   append(log.health, more.health);
 }
 
@@ -138,7 +130,7 @@ bool looks_like_rosbag_folder(const std::string& path) {
 
 RawLog read_rosbag_folder(const std::string& path) {
   std::optional<RawLog> log;
-  std::vector<RawSkip> lost;
+  std::vector<LeftOut> lost;
   std::string reason = "metadata.yaml lists no files";
   for (const std::string& name : listed_files(metadata_of(path))) {
     try {
@@ -159,7 +151,7 @@ RawLog read_rosbag_folder(const std::string& path) {
   }
   log->path = path;
   log->health.truncated |= !lost.empty();
-  log->skipped.insert(log->skipped.end(), lost.begin(), lost.end());
+  log->left_out.insert(log->left_out.end(), lost.begin(), lost.end());
   return std::move(*log);
 }
 
@@ -175,11 +167,9 @@ RawLog read_cfclient_folder(const std::string& path) {
   log.path = path;
   log.format = "csv";
   for (const fs::path& file : csv_files(path)) {
-    std::ifstream in(file, std::ios::binary);
-    if (!in) throw files::InputError({file.string(), "", "", "", "cannot be read", "check its permissions"});
+    std::ifstream in = open_log(file.string());
     RawLog part = read_table(in, file.string(), known_columns());
     for (RawTopic& topic : part.topics) topic.name = block_of(file.filename().string());
-    log.health.damaged_lines += part.health.damaged_lines;
     append(log, std::move(part));
   }
   return log;

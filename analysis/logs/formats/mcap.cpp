@@ -3,7 +3,7 @@
 /// Reads the topics of ROS 2 messages (encoding "cdr", definitions "ros2msg"). Times are the messages' log times, in
 /// seconds since 1970 or on whatever clock the recorder used. Chunks may be uncompressed or compressed with zstd or
 /// lz4. The summary section is not needed. A chunk with a wrong checksum is skipped and counted; of a truncated chunk,
-/// the part before the cut is kept. Topics with other encodings are listed in `skipped`. If the records become invalid,
+/// the part before the cut is kept. Topics with other encodings are listed in `left_out`. If the records become invalid,
 /// the reader searches for the next byte at which two valid records follow each other.
 #include <fmt/core.h>
 
@@ -281,10 +281,10 @@ class McapReader {
     if (chunk.is_whole && !is_sound_chunk) {
       ++log_.health.damaged_blocks;
       log_.health.skipped_bytes += chunk.records.size();
-      log_.skipped.push_back({fmt::format("chunk at offset {}", at),
-                              content.is_too_large ? "it is larger than stated, or too large for a flight"
-                                                   : "its checksum is wrong, or it cannot be decompressed",
-                              0});
+      log_.left_out.push_back({fmt::format("chunk at offset {}", at),
+                               content.is_too_large ? "it is larger than stated, or too large for a flight"
+                                                    : "its checksum is wrong, or it cannot be decompressed",
+                               0});
       return;
     }
     take_records(content.bytes, chunk.is_whole);
@@ -339,11 +339,11 @@ class McapReader {
     for (auto& [id, topic] : topics_) topic.move_to(log_, fmt::format("channel {}", id));
     number_instances(log_);
     for (const auto& [id, lost] : unknown_channels_)
-      log_.skipped.push_back(
+      log_.left_out.push_back(
           {fmt::format("channel {}", id), "the file lost the record that names its topic", lost});
     for (const auto& [name, chunks] : unknown_compressions_)
-      log_.skipped.push_back({fmt::format("{} chunks", chunks),
-                              "compression \"" + name + "\" is not known; supported are zstd and lz4", 0});
+      log_.left_out.push_back({fmt::format("{} chunks", chunks),
+                               "compression \"" + name + "\" is not known; supported are zstd and lz4", 0});
   }
 
   const std::string_view bytes_;

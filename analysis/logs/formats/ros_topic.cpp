@@ -30,7 +30,6 @@ bool RosTopic::read_value(const RosField& field, ColumnTable& table, RosNode* no
     double nanoseconds = 0;
     if (!cursor_.read(Scalar::kInt32, value) || !cursor_.read(Scalar::kUint32, nanoseconds)) return false;
     value += nanoseconds / 1e9;
-    if (node != nullptr) node->is_stamp = true;
   } else if (!cursor_.read(field.number, value)) {
     return false;
   }
@@ -149,11 +148,11 @@ void RosTopic::move_to(RawLog& log) {
   main_.move_to(log, !named_.empty());
   for (auto& [name, table] : named_) table.move_to(log, false);
   for (const std::string& array : large_arrays_)
-    log.skipped.push_back(
+    log.left_out.push_back(
         {name_ + "." + array, fmt::format("it has more than {} elements", kMostElements), 0});
   if (malformed_ > 0) {
     log.health.damaged_blocks += malformed_;
-    log.skipped.push_back({name_, "messages do not match the definition of their type", malformed_});
+    log.left_out.push_back({name_, "messages do not match the definition of their type", malformed_});
   }
 }
 
@@ -161,7 +160,7 @@ void FoundTopic::move_to(RawLog& log, const std::string& id) {
   if (topic)
     topic->move_to(log);
   else
-    log.skipped.push_back({name.empty() ? id : name, fault, lost});
+    log.left_out.push_back({name.empty() ? id : name, fault, lost});
 }
 
 FoundTopic found_topic(const std::string& name, const std::string& encoding, const std::string& type,

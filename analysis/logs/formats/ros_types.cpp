@@ -79,10 +79,6 @@ bool parse_type(std::string_view text, const std::string& package, WrittenField&
     written.field.number = *number;
     return true;
   }
-  // In ROS 1 these were built-in types.
-  if (name == "time") name = "builtin_interfaces/Time";
-  if (name == "duration") name = "builtin_interfaces/Duration";
-  if (name == "Header") name = "std_msgs/Header";
   if (!is_type_name(name)) return false;
   written.type =
       name.find('/') == std::string_view::npos ? package + "/" + std::string(name) : short_type_name(name);

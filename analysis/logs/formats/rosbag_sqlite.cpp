@@ -1,13 +1,13 @@
 /// @file rosbag2 in SQLite (`.db3`), the default of ROS 2 before Iron.
 ///
 /// Reads topics as read_mcap() does. Message definitions are taken from the database if it has them (since Iron), else
-/// built in; topics of other types are listed in `skipped`. Single messages compressed with zstd are
+/// built in; topics of other types are listed in `left_out`. Single messages compressed with zstd are
 /// supported.
 ///
-/// The database is read from memory: nothing is written, locked or created. A journal beside it is not applied; if it
-/// holds messages, `health.truncated` is set and `skipped` lists it. Views, triggers, virtual tables and computed
-/// columns are refused; work and sizes are limited by the size of the file. Reading stops at a damaged page; everything
-/// before it is kept.
+/// The database is read from memory: nothing is written, locked or created. What a recorder that was killed has left in
+/// the journal beside it (-wal) is read, and counted in `health.repaired`; a journal of another form is listed in
+/// `left_out`. Views, triggers, virtual tables and computed columns are refused; work and sizes are limited by the size
+/// of the file. Reading stops at a damaged page; everything before it is kept.
 #include <fmt/core.h>
 #include <sqlite3.h>
 
@@ -21,6 +21,7 @@
 #include "analysis/logs/formats/decompress.h"
 #include "analysis/logs/formats/formats.h"
 #include "analysis/logs/formats/ros_topic.h"
+#include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
 
 namespace swarmcert::logs {
@@ -113,6 +114,46 @@ class Rows {
   std::unique_ptr<sqlite3_stmt, Finalize> statement_;
   bool is_damaged_ = false;
 };
+
+/// Copies the pages that were committed to a write-ahead log into its database, as SQLite does: frames with the salts of
+/// the log's head and right checksums, up to the last that ends a transaction. Returns their number.
+/// https://www.sqlite.org/fileformat2.html#the_write_ahead_log
+std::size_t apply_journal(std::string_view journal, std::string& bytes) {
+  constexpr std::size_t kHead_bytes = 32, kFrameHead_bytes = 24, kSummedOfHead_bytes = 24,
+                        kSummedOfFrame_bytes = 8;
+  if (journal.size() < kHead_bytes || bytes.size() < kHead_bytes) return 0;
+  const auto stored = [&](std::size_t at) { return *integer_at<std::uint32_t>(journal, at); };
+  const auto number = [&](std::size_t at) { return __builtin_bswap32(stored(at)); };
+  const std::size_t page_bytes = number(8), frame_bytes = kFrameHead_bytes + page_bytes;
+  const bool is_swapped = (number(0) & 1) != 0;  // byte order of the words that are summed
+  std::uint32_t first = 0, second = 0;
+  const auto add = [&](std::size_t from, std::size_t size) {
+    for (std::size_t at = from; at < from + size; at += 8) {
+      first += (is_swapped ? number(at) : stored(at)) + second;
+      second += (is_swapped ? number(at + 4) : stored(at + 4)) + first;
+    }
+  };
+  const auto has_sum = [&](std::size_t at) { return number(at) == first && number(at + 4) == second; };
+  add(0, kSummedOfHead_bytes);
+  if (page_bytes < 512 || page_bytes > 65536 || page_bytes % 8 != 0 || !has_sum(24)) return 0;
+  std::size_t committed = 0, pages = 0;
+  for (std::size_t at = kHead_bytes; journal.size() - at >= frame_bytes; at += frame_bytes) {
+    add(at, kSummedOfFrame_bytes);
+    add(at + kFrameHead_bytes, page_bytes);
+    if (journal.substr(at + 8, 8) != journal.substr(16, 8) || !has_sum(at + 16)) break;
+    if (number(at + 4) == 0) continue;
+    committed = (at - kHead_bytes) / frame_bytes + 1;
+    pages = number(at + 4);
+  }
+  if (committed == 0 || pages * page_bytes > bytes.size() + journal.size()) return 0;
+  bytes.resize(pages * page_bytes);
+  for (std::size_t i = 0; i < committed; ++i) {
+    const std::size_t at = kHead_bytes + i * frame_bytes, page = number(at);
+    if (page > 0 && page <= pages)
+      bytes.replace((page - 1) * page_bytes, page_bytes, journal.substr(at + kFrameHead_bytes, page_bytes));
+  }
+  return committed;
+}
 
 /// Truncates a file to whole pages, because SQLite would pad the last page with zeros. Returns true if it was cut.
 bool cut_to_whole_pages(std::string& bytes) {
@@ -255,16 +296,8 @@ class RosbagReader {
     for (auto& [id, topic] : topics_) topic.move_to(log_, fmt::format("topic {}", id));
     number_instances(log_);
     if (without_topic_ > 0)
-      log_.skipped.push_back(
+      log_.left_out.push_back(
           {"messages without topic", "the file lost the rows that name their topics", without_topic_});
-    std::error_code error;
-    const auto journal_bytes = std::filesystem::file_size(path_ + "-wal", error);
-    if (error || journal_bytes == 0) return;
-    log_.health.truncated = true;
-    log_.skipped.push_back({path_ + "-wal",
-                            "the recorder did not finish; `sqlite3 FILE 'pragma wal_checkpoint'` moves "
-                            "the messages of this journal into the bag",
-                            0});
   }
 
   const bool is_cut_;
@@ -287,7 +320,16 @@ RawLog read_rosbag_sqlite(std::istream& in, const std::string& path) {
   std::string bytes = read_all(in, path);
   if (!looks_like_rosbag_sqlite(bytes))
     refuse_at(path, 0, "magic number", "", "is not that of an SQLite database", "is this a rosbag?");
-  return RosbagReader(bytes, path).read();
+  const std::string journal_path = path + "-wal";
+  std::error_code error;
+  if (std::filesystem::file_size(journal_path, error) == 0 || error) return RosbagReader(bytes, path).read();
+  const std::size_t pages = apply_journal(files::read_file(journal_path, kLargestLog_bytes), bytes);
+  RawLog log = RosbagReader(bytes, path).read();
+  log.health.repaired.journal_pages = pages;
+  log.health.truncated |= pages == 0;
+  if (pages == 0)
+    log.left_out.push_back({journal_path, "it is no journal of this bag that holds whole transactions", 0});
+  return log;
 }
 
 }  // namespace swarmcert::logs

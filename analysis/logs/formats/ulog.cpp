@@ -1,14 +1,13 @@
 /// @file PX4 ULog (`.ulg`), file format versions 0 and 1.
 ///
 /// Reads a log. Topics are identified by name and instance (multi_id); times come from their field `timestamp`.
-/// Parameters are those at the start of the log. A topic whose subscription or format is lost is listed in `skipped`.
+/// Parameters are those at the start of the log. A topic whose subscription or format is lost is listed in `left_out`.
 /// Messages of unknown types are skipped, as the format requires. If no valid message follows, the reader searches for
 /// the next valid message that is followed by others, and counts the damaged place and the skipped bytes in `health`.
 /// Sections appended after a crash are read as well.
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <limits>
 
 #include "analysis/logs/formats/bytes.h"
 #include "analysis/logs/formats/formats.h"
@@ -124,7 +123,7 @@ class UlogReader {
       read_section(begin, end, end == bytes_.size());
       begin = end;
     }
-    for (const auto& [what, records] : left_out_) log_.skipped.push_back({what.first, what.second, records});
+    for (const auto& [what, records] : left_out_) log_.left_out.push_back({what.first, what.second, records});
     return std::move(log_);
   }
 
@@ -309,16 +308,10 @@ class UlogReader {
       case 'D':
         take_record(body);
         break;
-      case 'L':
-        take_line(body.substr(1));
-        break;
-      case 'C':
-        take_line(body.substr(3));
-        break;
       case 'O':
-        log_.dropouts.push_back({last_time_s_, *integer_at<std::uint16_t>(body, 0) / 1e3});
+        log_.health.dropouts_s += *integer_at<std::uint16_t>(body, 0) / 1e3;
         break;
-      default:  // flags, information, defaults and synchronisation
+      default:  // flags, information, texts, defaults and synchronisation
         break;
     }
   }
@@ -339,12 +332,6 @@ class UlogReader {
     subscriptions_[*integer_at<std::uint16_t>(body, 1)] = subscription;
   }
 
-  /// @param body timestamp and text
-  void take_line(std::string_view body) {
-    const double time_s = static_cast<double>(*integer_at<std::uint64_t>(body, 0)) / 1e6;
-    log_.messages.push_back({time_s, until_nul(body.substr(8))});
-  }
-
   Topic& topic_of(Subscription& subscription) {
     if (!subscription.topic) {
       const auto [found, is_new] =
@@ -359,16 +346,16 @@ class UlogReader {
     Topic topic{formats_.layout(subscription.name), log_.topics.size()};
     const UlogLayout& layout = topic.layout;
     for (const std::string& name : layout.large_arrays)
-      log_.skipped.push_back(
+      log_.left_out.push_back(
           {subscription.name + "." + name, fmt::format("it has more than {} elements", kMostElements), 0});
     if (layout.has_too_many_columns)
-      log_.skipped.push_back(
+      log_.left_out.push_back(
           {subscription.name, fmt::format("only its first {} numbers are kept", kMostColumns), 0});
-    if (!layout.timestamp) log_.skipped.push_back({subscription.name, "it has no field \"timestamp\"", 0});
+    if (!layout.timestamp) log_.left_out.push_back({subscription.name, "it has no field \"timestamp\"", 0});
     RawTopic raw;
     raw.name = raw.type = subscription.name;
     raw.instance = subscription.instance;
-    for (const UlogNumber& number : layout.numbers) raw.columns.push_back({number.name, "", {}});
+    for (const UlogNumber& number : layout.numbers) raw.columns.push_back({number.name, {}});
     if (layout.timestamp) log_.topics.push_back(std::move(raw));
     topics_.push_back(std::move(topic));
   }
@@ -380,8 +367,7 @@ class UlogReader {
     if (!layout.timestamp) return;
     const char* const record = body.data() + 2;
     RawTopic& raw = log_.topics[topic.index];
-    last_time_s_ = value_of(layout.timestamp->type, record + layout.timestamp->offset) / 1e6;
-    raw.time_s.push_back(last_time_s_);
+    raw.time_s.push_back(value_of(layout.timestamp->type, record + layout.timestamp->offset) / 1e6);
     for (std::size_t i = 0; i < layout.numbers.size(); ++i) {
       const UlogNumber& number = layout.numbers[i];
       raw.columns[i].values.push_back(value_of(number.type, record + number.offset));
@@ -398,7 +384,6 @@ class UlogReader {
   std::map<std::pair<std::string, int>, std::size_t> topics_of_;         ///< index in topics_
   std::map<std::pair<std::string, std::string>, std::size_t> left_out_;  ///< records by name and reason
   std::size_t looked_at_bytes_ = 0;
-  double last_time_s_ = std::numeric_limits<double>::quiet_NaN();
 };
 
 }  // namespace

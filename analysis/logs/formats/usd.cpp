@@ -60,7 +60,7 @@ struct UsdVariables {
   RawTopic topic(const std::string& name) const {
     RawTopic topic;
     topic.name = name;
-    for (const std::string& column : names) topic.columns.push_back({column, "", {}});
+    for (const std::string& column : names) topic.columns.push_back({column, {}});
     return topic;
   }
   void add_record(const char* record, RawTopic& topic) const {
