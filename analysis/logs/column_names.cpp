@@ -66,7 +66,7 @@ std::optional<Index> index_of(const std::string& word) {
 
 bool is_known(const std::string& word) {
   return quantity_words().count(word) > 0 || is_word_of("wish", word) || is_word_of("foreign", word) ||
-         is_word_of("neutral", word);
+         is_word_of("neutral", word) || is_word_of("silent", word);
 }
 
 /// Returns the words of a name; glued ones are split where both parts are known: "posx", "qw", "pwm1", "xdot".
@@ -219,7 +219,7 @@ NameReading read_name(const std::string& column) {
       name.is_wish = true;
     } else if (is_word_of("foreign", word)) {
       name.is_foreign = true;
-    } else {
+    } else if (!is_word_of("silent", word)) {
       const bool is_neutral = is_word_of("neutral", word) || index_of(word);
       for (double& bits : name.bits) bits -= is_neutral ? 1 : kUnknownWord;
     }

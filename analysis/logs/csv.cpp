@@ -147,24 +147,22 @@ std::vector<std::string> with_elements(const std::vector<std::string>& names,
 
 /// Adds the nanoseconds that stand in the column after whole seconds to these: they rise within each second.
 void join_nanoseconds(RawTopic& topic) {
+  const auto are_whole = [](const std::vector<double>& values) {
+    return std::all_of(values.begin(), values.end(), [](double x) { return x == std::floor(x); });
+  };
   for (std::size_t c = 0; c + 1 < topic.columns.size(); ++c) {
     std::vector<double>& seconds = topic.columns[c].values;
-    const std::vector<double>& nanoseconds = topic.columns[c + 1].values;
-    std::size_t same = 0, falls = 0, others = 0;
-    for (std::size_t i = 1; i < seconds.size(); ++i) {
-      const double step = nanoseconds[i] - nanoseconds[i - 1];
-      const bool is_count = seconds[i] == std::floor(seconds[i]) &&
-                            nanoseconds[i] == std::floor(nanoseconds[i]) && nanoseconds[i] >= 0 &&
-                            nanoseconds[i] < 1e9;
-      if (is_count && seconds[i] == seconds[i - 1] && step >= 0)
-        ++same;
-      else if (is_count && seconds[i] > seconds[i - 1])
-        falls += step < 0 ? 1 : 0;
-      else
-        ++others;
+    const std::vector<double>& more = topic.columns[c + 1].values;
+    if (!are_whole(seconds) || !are_whole(more) || std::is_sorted(more.begin(), more.end())) continue;
+    std::vector<double> joined = seconds;
+    std::size_t same = 0;
+    for (std::size_t i = 0; i < joined.size(); ++i) {
+      joined[i] += 1e-9 * more[i];
+      same += i > 0 && seconds[i] == seconds[i - 1] ? 1 : 0;
     }
-    if (others > 0 || falls == 0 || 2 * same < seconds.size() || quantile_of(nanoseconds, 1) < 1e6) continue;
-    for (std::size_t i = 0; i < seconds.size(); ++i) seconds[i] += 1e-9 * nanoseconds[i];
+    const double least = quantile_of(more, 0), most = quantile_of(more, 1);
+    const bool is_clock = least >= 0 && most > 1e6 && most < 1e9 && 2 * same > seconds.size();
+    if (is_clock && std::is_sorted(joined.begin(), joined.end())) seconds = std::move(joined);
   }
 }
 
@@ -245,8 +243,9 @@ RawLog read_table(std::istream& in, const std::string& path, const SignalMap& ma
   const std::string where = "line " + std::to_string(header ? header->line : 1);
   std::size_t at = header ? header->end : 0, number = header ? header->line : 0;
   double first_number = 0;
-  if (!names.empty() &&
-      parse_cell(names[0], header->separator != ',', first_number)) {  // no header, a record
+  const bool is_record =
+      !names.empty() && !names[0].empty() && parse_cell(names[0], header->separator != ',', first_number);
+  if (is_record) {  // there is no header
     for (std::size_t i = 0; i < names.size(); ++i) names[i] = "column " + std::to_string(i + 1);
     at = header->begin;
     --number;

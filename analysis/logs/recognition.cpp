@@ -27,7 +27,7 @@ class ColumnIndex {
     for (std::size_t c = 0; c < topic.columns.size(); ++c) {
       const std::string& name = topic.columns[c].name;
       const auto index = static_cast<int>(c);
-      exact_.emplace(name, index);
+      whole_.emplace(name, index);
       const std::string plain = plain_name(name);
       whole_.emplace(plain, index);
       // "cf1.att.stateestimate.qx" is also found as "stateestimate.qx".
@@ -44,8 +44,7 @@ class ColumnIndex {
   std::vector<int> columns_called(const std::vector<std::string>& names, bool is_shortened) const {
     std::vector<int> columns;
     for (const std::string& name : names) {
-      const bool is_exact = name.find('[') != std::string::npos;
-      const Index& known = is_exact ? exact_ : is_shortened ? shortened_ : whole_;
+      const Index& known = is_shortened && name.find('[') == std::string::npos ? shortened_ : whole_;
       const auto found = known.find(name);
       columns.push_back(found == known.end() ? -1 : found->second);
     }
@@ -54,7 +53,7 @@ class ColumnIndex {
 
  private:
   using Index = std::unordered_map<std::string, int>;
-  Index exact_, whole_, shortened_;
+  Index whole_, shortened_;
 };
 
 /// Ignores columns without any number.
@@ -72,15 +71,8 @@ void recognise_row(const RawLog& log, const std::vector<ColumnIndex>& indices, c
     const bool is_of_messages =
         row.origin == Origin::kMessages || (row.origin == Origin::kOwn && log.format == "csv");
     if (is_of_messages && is_plain_table(log, topic)) continue;
-    Carried carried{row.signal,
-                    t,
-                    indices[t].columns_called(row.names, is_shortened),
-                    row.unit,
-                    row.multiply,
-                    row.divide,
-                    row.ask,
-                    row.sign};
-    const std::vector<int> named = carried.columns;
+    const std::vector<int> named = indices[t].columns_called(row.names, is_shortened);
+    Carried carried{row.signal, t, named, row.unit, row.multiply, row.divide, row.ask, row.sign};
     drop_empty_columns(topic, carried);
     const auto missing = std::count(carried.columns.begin(), carried.columns.end(), -1);
     const auto size = static_cast<std::ptrdiff_t>(carried.columns.size());
@@ -173,11 +165,6 @@ const Carried* Recognition::find(int signal) const {
     if (carried.signal == signal) return &carried;
   }
   return nullptr;
-}
-
-Carried* Recognition::find(int signal) {
-  const Recognition& constant = *this;
-  return const_cast<Carried*>(constant.find(signal));
 }
 
 bool has_torque_signals(const Recognition& recognition) {

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <limits>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "analysis/logs/dictionary.h"
@@ -30,14 +31,14 @@ struct Carried {
 };
 
 struct Recognition {
-  std::vector<Carried> groups;         ///< at most one per first signal
-  std::size_t clock = 0;               ///< the topic whose records become samples
+  std::vector<Carried> groups;        ///< at most one per first signal
+  std::size_t clock = 0;              ///< the topic whose records become samples
   std::vector<std::string> rejected;  ///< groups with dead values or several possible meanings, in words
   /// Units that the values show, also where the motion contradicts known names, in words.
   std::vector<std::string> decided;
 
   const Carried* find(int signal) const;
-  Carried* find(int signal);
+  Carried* find(int signal) { return const_cast<Carried*>(std::as_const(*this).find(signal)); }
 };
 
 /// Recognises columns by the names of known programs and then by evidence (assignment.h), or by `map` if it is not

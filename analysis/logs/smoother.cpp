@@ -4,43 +4,43 @@
 #include <Eigen/Core>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 namespace swarmcert::logs {
 namespace {
 
-/// The normal equations of a polynomial in tau; the solver reads only the lower triangle.
+/// The least-squares polynomial in tau through the finite ones among values[first] to values[end - 1]; nothing if these
+/// are too few.
+/// @param from, half tau = (t - from) / half
 template <int Degree>
-struct NormalEquations {
-  using Matrix = Eigen::Matrix<double, Degree + 1, Degree + 1>;
-  using Vector = Eigen::Matrix<double, Degree + 1, 1>;
-  Matrix matrix = Matrix::Zero();
-  Vector right = Vector::Zero();
+std::optional<Eigen::Matrix<double, Degree + 1, 1>> fit(const std::vector<double>& times,
+                                                        const std::vector<double>& values, std::size_t first,
+                                                        std::size_t end, double from, double half) {
+  Eigen::Matrix<double, Degree + 1, Degree + 1> matrix;  // of which the solver reads only the lower triangle
+  Eigen::Matrix<double, Degree + 1, 1> right;
+  // Plain arrays and fixed loop counts keep the sums in registers.
+  double sums[Degree + 1][Degree + 1] = {}, products[Degree + 1] = {}, powers[Degree + 1] = {1};
   int count = 0;
-
-  /// Adds the finite ones among values[first] to values[end - 1].
-  /// @param from, half tau = (t - from) / half
-  void add(const std::vector<double>& times, const std::vector<double>& values, std::size_t first,
-           std::size_t end, double from, double half) {
-    // Plain arrays and fixed loop counts keep the sums in registers.
-    double sums[Degree + 1][Degree + 1] = {}, products[Degree + 1] = {}, powers[Degree + 1] = {1};
-    for (std::size_t k = first; k < end; ++k) {
-      if (!std::isfinite(values[k])) continue;
-      const double tau = (times[k] - from) / half;
+  for (std::size_t k = first; k < end; ++k) {
+    if (!std::isfinite(values[k])) continue;
+    const double tau = (times[k] - from) / half;
 #pragma GCC unroll 4
-      for (int row = 0; row <= Degree; ++row) {
-        if (row > 0) powers[row] = powers[row - 1] * tau;
-#pragma GCC unroll 4
-        for (int column = 0; column <= row; ++column) sums[row][column] += powers[row] * powers[column];
-        products[row] += values[k] * powers[row];
-      }
-      ++count;
-    }
     for (int row = 0; row <= Degree; ++row) {
-      for (int column = 0; column <= row; ++column) matrix(row, column) = sums[row][column];
-      right[row] = products[row];
+      if (row > 0) powers[row] = powers[row - 1] * tau;
+#pragma GCC unroll 4
+      for (int column = 0; column <= row; ++column) sums[row][column] += powers[row] * powers[column];
+      products[row] += values[k] * powers[row];
     }
+    ++count;
   }
-};
+  if (count <= Degree) return std::nullopt;
+  matrix.setZero();
+  for (int row = 0; row <= Degree; ++row) {
+    for (int column = 0; column <= row; ++column) matrix(row, column) = sums[row][column];
+    right[row] = products[row];
+  }
+  return matrix.ldlt().solve(right);
+}
 
 template <int Degree>
 std::vector<std::vector<double>> derivatives_of_fits(const SignalTable& table,
@@ -60,11 +60,9 @@ std::vector<std::vector<double>> derivatives_of_fits(const SignalTable& table,
     if (end <= i) end = i + 1;
     while (end < n && table.restarts[end] == 0 && table.time_us[end] <= table.time_us[i] + half_us) ++end;
     if (first < stretch) first = stretch;
-    NormalEquations<Degree> equations;
-    equations.add(table.time_us, series, first, end, table.time_us[i], half_us);
-    if (equations.count <= Degree) continue;
-    const typename NormalEquations<Degree>::Vector fitted = equations.matrix.ldlt().solve(equations.right);
-    for (std::size_t d = 0; d < derivatives.size(); ++d) results[d][i] = fitted[derivatives[d]] * scales[d];
+    const auto fitted = fit<Degree>(table.time_us, series, first, end, table.time_us[i], half_us);
+    for (std::size_t d = 0; fitted && d < derivatives.size(); ++d)
+      results[d][i] = (*fitted)[derivatives[d]] * scales[d];
   }
   return results;
 }

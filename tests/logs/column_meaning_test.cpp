@@ -222,10 +222,10 @@ std::string px4_flight(int invalid, std::uint8_t vehicle_type, const std::string
   for (int k = 0; k < kRecords; ++k) {
     const Flight f{0.01 * k};
     const std::uint64_t time_us = 5'000'000 + 10'000 * static_cast<std::uint64_t>(k);
-    text += ulog_record(
-        1, time_us,
-        floats({f.x(), -f.y(), -f.z(), f.vx(), -f.vy(), -f.vz()}) + std::string(2, k < invalid ? '\0' : '\1') +
-            std::string(1, dead_reckoning ? '\1' : '\0'));
+    text += ulog_record(1, time_us,
+                        floats({f.x(), -f.y(), -f.z(), f.vx(), -f.vy(), -f.vz()}) +
+                            std::string(2, k < invalid ? '\0' : '\1') +
+                            std::string(1, dead_reckoning ? '\1' : '\0'));
     text += ulog_record(2, time_us, floats({0.45, 0.45, 0.45, 0.45}));
     if (k % 100 != 0) continue;
     std::string pwm;

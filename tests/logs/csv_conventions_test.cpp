@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <sstream>
 
 #include "analysis/logs/plausibility.h"
@@ -200,6 +201,63 @@ TEST(CsvConventions, AFlightBelowTheGroundPointsDownAndAMissingPositionIsNotDoub
   EXPECT_GT(convention(below).samples[100].position_m[2], 1) << "read as a flight above the ground";
   EXPECT_EQ(doubted(convention(below)), "");
   EXPECT_EQ(doubted(convention(none)), "");
+}
+
+/// Rows of the climb: time, position, quaternion, as its parts of text.
+std::string climb_rows(const std::function<std::string(int)>& clock, const std::string& separator,
+                       const std::string& before = "") {
+  std::string rows;
+  for (int k = 0; k < 400; ++k) {
+    const double t = 0.01 * k, pitch = std::atan2(-2.7 * std::sin(3 * t), logs::kGravity_m_s2);
+    rows += clock(k) + separator + before;
+    for (const double value : {0.3 * std::sin(3 * t), 0.2 * std::sin(2 * t), 1 + 0.1 * std::sin(2.5 * t), 0.0,
+                               std::sin(pitch / 2), 0.0})
+      rows += fmt::format("{:.6f}", value) + separator;
+    rows += fmt::format("{:.6f}\n", std::cos(pitch / 2));
+  }
+  return rows;
+}
+
+void expect_swing(const std::string& text, const char* what) {
+  const logs::Log log = convention(text);
+  ASSERT_EQ(log.samples.size(), 400u) << what;
+  EXPECT_TRUE(log.signals.position && log.signals.attitude) << what;
+  EXPECT_NEAR(1e-6 * (log.samples[300].time_us - log.samples[0].time_us), 3, 1e-6) << what;
+  EXPECT_NEAR(log.samples[300].position_m[0], 0.3 * std::sin(9.0), 1e-5) << what;
+}
+
+/// `ros2 topic echo --csv` writes seconds, nanoseconds and the frame first, and no header; other programs write
+/// trajectories without one.
+TEST(CsvConventions, WithoutAHeaderTheValuesSayWhatTheColumnsAre) {
+  const auto stamp = [](int k) { return fmt::format("{},{}", 1772446507 + k / 100, 10'000'000 * (k % 100)); };
+  const auto epoch = [](int k) { return fmt::format("{:.6f}", 1305031102.17 + 0.01 * k); };
+  expect_swing(climb_rows(stamp, ",", "map,"), "ros2 topic echo --csv");
+  expect_swing(climb_rows(epoch, " "), "a trajectory");
+  expect_swing("# by hand\n" + climb_rows(epoch, " "), "a comment that is no header");
+  expect_swing("stamp.sec,stamp.nanosec,x,y,z,qx,qy,qz,qw\n" + climb_rows(stamp, ","), "with a header");
+}
+
+TEST(CsvConventions, TheUnitInTheNameOfAClockIsBelieved) {
+  std::string text = "time (us),px,py,pz\n";
+  for (int k = 0; k < 400; ++k) text += fmt::format("{},{:.6f},0,1\n", 250 * k, 0.001 * k);
+  const logs::Log log = convention(text);
+  EXPECT_NEAR(log.samples.back().time_us - log.samples.front().time_us, 250 * 399, 1e-6);
+}
+
+TEST(CsvConventions, SeparatorsWithinQuotesAreNone) {
+  expect_swing("\"t (s)\";\"x, m\";\"y, m\";\"z, m\";qx;qy;qz;qw\n" +
+                   climb_rows([](int k) { return fmt::format("{:.2f}", 0.01 * k); }, ";"),
+               "quoted names with commas");
+}
+
+TEST(CsvConventions, PulsesOfSixMotorsAreReadAsMicroseconds) {
+  std::string text = "t,px,py,pz,m1,m2,m3,m4,m5,m6\n";
+  for (int k = 0; k < 400; ++k)
+    text += fmt::format("{0:.2f},{1:.5f},0,1.5,{2},{2},{2},{2},{2},{2}\n", 0.01 * k, 0.2 * std::sin(0.03 * k),
+                        1500 + k % 5);
+  const logs::Log log = convention(text);
+  EXPECT_EQ(log.signals.motor_commands, 6);
+  EXPECT_NEAR(log.samples[200].motor_command[5], 0.5, 0.005);
 }
 
 }  // namespace

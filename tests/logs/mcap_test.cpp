@@ -150,7 +150,9 @@ TEST(Mcap, NamesTopicsThatItCannotRead) {
   EXPECT_NE(why["/no_schema"].find("lost the definition"), std::string::npos);
   EXPECT_NE(why["/odd"].find("cannot be used"), std::string::npos);
   EXPECT_NE(why["channel 7"].find("lost the record"), std::string::npos);
-  EXPECT_NE(why["1 chunks"].find("\"xz\""), std::string::npos);
+  EXPECT_TRUE(std::any_of(log.left_out.begin(), log.left_out.end(), [](const logs::LeftOut& one) {
+    return one.why.find("\"xz\"") != std::string::npos;
+  }));
   EXPECT_EQ(why.count("/odometry"), 0u) << "its type is known here, whatever language its definition has";
 }
 

@@ -269,10 +269,12 @@ class McapReader {
     const std::map<std::string_view, Compression> known = {
         {"", Compression::kNone}, {"zstd", Compression::kZstd}, {"lz4", Compression::kLz4}};
     const auto compression = known.find(chunk.compression);
-    if (compression == known.end()) {
-      ++unknown_compressions_[std::string(chunk.compression.substr(0, 64))];
-      return;
-    }
+    if (compression == known.end())
+      return log_.left_out.push_back(
+          {fmt::format("chunk at offset {}", at),
+           fmt::format("compression \"{}\" is not known; supported are zstd and lz4",
+                       chunk.compression.substr(0, 64)),
+           0});
     const std::size_t limit = std::min<std::uint64_t>(decompression_left_, chunk.uncompressed_bytes);
     const Decompressed content = decompress(compression->second, chunk.records, limit);
     decompression_left_ -= std::min(decompression_left_, content.bytes.size());
@@ -341,9 +343,6 @@ class McapReader {
     for (const auto& [id, lost] : unknown_channels_)
       log_.left_out.push_back(
           {fmt::format("channel {}", id), "the file lost the record that names its topic", lost});
-    for (const auto& [name, chunks] : unknown_compressions_)
-      log_.left_out.push_back({fmt::format("{} chunks", chunks),
-                               "compression \"" + name + "\" is not known; supported are zstd and lz4", 0});
   }
 
   const std::string_view bytes_;
@@ -357,7 +356,6 @@ class McapReader {
   std::map<std::uint16_t, McapChannel> channels_;
   std::map<std::uint16_t, FoundTopic> topics_;
   std::map<std::uint16_t, std::size_t> unknown_channels_;
-  std::map<std::string, std::size_t> unknown_compressions_;
   std::optional<McapChunk> cut_chunk_;
   std::optional<std::size_t> cut_offset_;
 };

@@ -7,6 +7,7 @@
 
 #include "analysis/logs/csv.h"
 #include "analysis/logs/dictionary.h"
+#include "nn/base/text.h"
 
 namespace swarmcert::logs {
 namespace {
@@ -55,12 +56,9 @@ bool parse_array(std::string_view brackets, RosField& field) {
 }
 
 bool is_type_name(std::string_view name) {
-  while (true) {
-    const std::size_t slash = name.find('/');
-    if (!is_identifier(name.substr(0, slash))) return false;
-    if (slash == std::string_view::npos) return true;
-    name.remove_prefix(slash + 1);
-  }
+  const std::vector<std::string> parts = files::split_at(name, "/");
+  return !parts.empty() && name.back() != '/' &&
+         std::all_of(parts.begin(), parts.end(), [](const std::string& part) { return is_identifier(part); });
 }
 
 /// @param package of the definition, for type names without a package
