@@ -221,7 +221,7 @@ std::optional<TableHeader> header_of(std::string_view text, char otherwise) {
     return files::csv_cells(row, files::csv_separator(row, otherwise)).size();
   };
   if (!comment.empty() &&
-      (line.empty() || (parse_cell(first, false, number) && cells_in(comment) == cells_in(line)))) {
+      (line.empty() || (parse_cell(first, false, number) && cells_in(comment) >= cells_in(line)))) {
     header.end = header.begin;
     header.begin = comment_at;
     --header.line;

@@ -12,8 +12,8 @@
 
 namespace swarmcert::logs {
 
-/// The line with the column names: the first line that is no comment or, if that is a record, the comment before it with
-/// as many cells. It may itself start with "#".
+/// The line with the column names: the first line that is no comment or, if that is a record, the comment before it
+/// with as many cells or more. It may itself start with "#".
 struct TableHeader {
   std::size_t begin = 0, end = 0;  ///< of its line in the text, with the line end
   std::size_t line = 0;            ///< its number, from 1

@@ -257,7 +257,7 @@ TEST(ColumnMeaning, RecordsThatTheEstimatorCallsInvalidForATimeAreLeftOutAndCoun
   EXPECT_EQ(log.left_out[0].name, "vehicle_local_position");
   EXPECT_EQ(log.left_out[0].records, 120u);
   EXPECT_EQ(log.samples.size(), static_cast<std::size_t>(kRecords - 120));
-  EXPECT_TRUE(log.signals.force_axes[0]);
+  EXPECT_TRUE(log.signals.position);
   EXPECT_TRUE(logs::is_sound(log.health));
 }
 

@@ -203,17 +203,20 @@ TEST(CsvConventions, AFlightBelowTheGroundPointsDownAndAMissingPositionIsNotDoub
   EXPECT_EQ(doubted(convention(none)), "");
 }
 
-/// Rows of the climb: time, position, quaternion, as its parts of text.
-std::string climb_rows(const std::function<std::string(int)>& clock, const std::string& separator,
+/// Rows of a swing: time, position, quaternion.
+std::string swing_rows(const std::function<std::string(int)>& clock, const std::string& separator,
                        const std::string& before = "") {
   std::string rows;
   for (int k = 0; k < 400; ++k) {
-    const double t = 0.01 * k, pitch = std::atan2(-2.7 * std::sin(3 * t), logs::kGravity_m_s2);
+    const double t = 0.01 * k, ax = -2.7 * std::sin(3 * t), ay = -0.8 * std::sin(2 * t),
+                 up = logs::kGravity_m_s2 - 0.625 * std::sin(2.5 * t);
+    const double pitch = std::atan2(ax, up) / 2, roll = std::atan2(-ay, std::hypot(ax, up)) / 2;
     rows += clock(k) + separator + before;
-    for (const double value : {0.3 * std::sin(3 * t), 0.2 * std::sin(2 * t), 1 + 0.1 * std::sin(2.5 * t), 0.0,
-                               std::sin(pitch / 2), 0.0})
+    for (const double value : {0.3 * std::sin(3 * t), 0.2 * std::sin(2 * t), 1 + 0.1 * std::sin(2.5 * t),
+                               std::sin(roll) * std::cos(pitch), std::cos(roll) * std::sin(pitch),
+                               -std::sin(roll) * std::sin(pitch)})
       rows += fmt::format("{:.6f}", value) + separator;
-    rows += fmt::format("{:.6f}\n", std::cos(pitch / 2));
+    rows += fmt::format("{:.6f}\n", std::cos(roll) * std::cos(pitch));
   }
   return rows;
 }
@@ -231,10 +234,10 @@ void expect_swing(const std::string& text, const char* what) {
 TEST(CsvConventions, WithoutAHeaderTheValuesSayWhatTheColumnsAre) {
   const auto stamp = [](int k) { return fmt::format("{},{}", 1772446507 + k / 100, 10'000'000 * (k % 100)); };
   const auto epoch = [](int k) { return fmt::format("{:.6f}", 1305031102.17 + 0.01 * k); };
-  expect_swing(climb_rows(stamp, ",", "map,"), "ros2 topic echo --csv");
-  expect_swing(climb_rows(epoch, " "), "a trajectory");
-  expect_swing("# by hand\n" + climb_rows(epoch, " "), "a comment that is no header");
-  expect_swing("stamp.sec,stamp.nanosec,x,y,z,qx,qy,qz,qw\n" + climb_rows(stamp, ","), "with a header");
+  expect_swing(swing_rows(stamp, ",", "map,"), "ros2 topic echo --csv");
+  expect_swing(swing_rows(epoch, " "), "a trajectory");
+  expect_swing("# by hand\n" + swing_rows(epoch, " "), "a comment that is no header");
+  expect_swing("stamp.sec,stamp.nanosec,x,y,z,qx,qy,qz,qw\n" + swing_rows(stamp, ","), "with a header");
 }
 
 TEST(CsvConventions, TheUnitInTheNameOfAClockIsBelieved) {
@@ -246,7 +249,7 @@ TEST(CsvConventions, TheUnitInTheNameOfAClockIsBelieved) {
 
 TEST(CsvConventions, SeparatorsWithinQuotesAreNone) {
   expect_swing("\"t (s)\";\"x, m\";\"y, m\";\"z, m\";qx;qy;qz;qw\n" +
-                   climb_rows([](int k) { return fmt::format("{:.2f}", 0.01 * k); }, ";"),
+                   swing_rows([](int k) { return fmt::format("{:.2f}", 0.01 * k); }, ";"),
                "quoted names with commas");
 }
 

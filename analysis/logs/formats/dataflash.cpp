@@ -1,9 +1,9 @@
 /// @file ArduPilot dataflash logs (`.bin`).
 ///
 /// Reads a log. Topics are named after their message ("XKF1", "ATT", "RCOU", "BAT", "MOTB"); a field that the log
-/// declares as the instance becomes RawTopic::instance. Times come from `TimeUS` or `TimeMS`. The multipliers of the log
-/// (MULT) and those of the number types (centidegrees to degrees, 1e-7 degrees to degrees) are applied. Parameters are
-/// the first values in PARM. MSG gives the messages. If no message follows, the reader searches for the next two
+/// declares as the instance becomes RawTopic::instance. Times come from `TimeUS` or `TimeMS`. The multipliers of the
+/// log (MULT) and those of the number types (centidegrees to degrees, 1e-7 degrees to degrees) are applied. Parameters
+/// are the first values in PARM. MSG gives the messages. If no message follows, the reader searches for the next two
 /// consecutive messages and counts the damaged place and the skipped bytes.
 #include <fmt/core.h>
 

@@ -3,8 +3,8 @@
 /// Reads the topics of ROS 2 messages (encoding "cdr", definitions "ros2msg"). Times are the messages' log times, in
 /// seconds since 1970 or on whatever clock the recorder used. Chunks may be uncompressed or compressed with zstd or
 /// lz4. The summary section is not needed. A chunk with a wrong checksum is skipped and counted; of a truncated chunk,
-/// the part before the cut is kept. Topics with other encodings are listed in `left_out`. If the records become invalid,
-/// the reader searches for the next byte at which two valid records follow each other.
+/// the part before the cut is kept. Topics with other encodings are listed in `left_out`. If the records become
+/// invalid, the reader searches for the next byte at which two valid records follow each other.
 #include <fmt/core.h>
 
 #include <algorithm>

@@ -115,8 +115,8 @@ class Rows {
   bool is_damaged_ = false;
 };
 
-/// Copies the pages that were committed to a write-ahead log into its database, as SQLite does: frames with the salts of
-/// the log's head and right checksums, up to the last that ends a transaction. Returns their number.
+/// Copies the pages that were committed to a write-ahead log into its database, as SQLite does: frames with the salts
+/// of the log's head and right checksums, up to the last that ends a transaction. Returns their number.
 /// https://www.sqlite.org/fileformat2.html#the_write_ahead_log
 std::size_t apply_journal(std::string_view journal, std::string& bytes) {
   constexpr std::size_t kHead_bytes = 32, kFrameHead_bytes = 24, kSummedOfHead_bytes = 24,
