@@ -9,8 +9,8 @@ namespace swarmcert::files {
 /// Returns `text` without leading and trailing blanks, carriage returns and double quotes.
 std::string_view without_blanks(std::string_view text);
 
-/// Returns the first of comma, semicolon and tab, in this order of preference, that `line` contains outside of quotes; else
-/// `otherwise`.
+/// Returns the first of comma, semicolon and tab, in this order of preference, that `line` contains outside of quotes;
+/// else `otherwise`.
 char csv_separator(std::string_view line, char otherwise);
 
 /// Returns the cells of `line`, without blanks and quotes around them. With separator ' ', runs of blanks count once.
