@@ -52,6 +52,7 @@ struct Kernel {
 
 /// Fills a kernel; a sink of KernelWalk::run().
 struct FillKernel {
+  static constexpr bool kSums = false;
   static constexpr double kLongest_rad = 0.02, kLongestSwing_rad = 0.02;
   Kernel kernel;
   double period_s, ratio;
