@@ -17,7 +17,6 @@ struct Stretch {
   Interval acceleration_m_s2[3];                   ///< a_d per axis
   Interval acceleration_now_m_s2[3];               ///< over the slices alone
   Interval jerk_m_s3[3];                           ///< over the slices and the `held_s` before them
-  std::vector<double> relative_acceleration_m_s2;  ///< per neighbour, largest |a_j - a|
 };
 
 struct Motion {
