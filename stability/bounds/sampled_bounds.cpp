@@ -93,8 +93,7 @@ Kernel kernel_of(const SampledAdjoint& adjoint, Channel channel, double phase_s,
     KernelWalk::of_force(adjoint).run(output, fill);
   } else {
     // An error of one period is a force held for that period, with the same int |eps| dt.
-    const SampledModel& model = adjoint.model();
-    const Eigen::VectorXd input = Eigen::VectorXd::Unit(model.size() + 1, model.command_index());
+    const Eigen::VectorXd input = adjoint.model().commanded().transpose();
     const double own = output.dot(input) / h;
     if (with_own) kernel.add(own, own, h);
     KernelWalk::of_held(adjoint, input).run(output, fill);

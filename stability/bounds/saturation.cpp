@@ -13,12 +13,9 @@
 namespace swarmcert::stability {
 namespace {
 
-AxisLoop& plant_of_loop(AxisLoop& loop) { return loop; }
-AxisLoop& plant_of_loop(SampledLoop& loop) { return loop.plant; }
-
 template <class AnyLoop>
 double integral_replaced_N(AnyLoop& loop, double limit_m_s) {
-  AxisLoop& plant = plant_of_loop(loop);
+  AxisLoop& plant = plant_of(loop);
   Disturbance integral;
   integral.amplitude_N = plant.mass_kg * plant.Ki * limit_m_s;
   plant.Ki = 0;

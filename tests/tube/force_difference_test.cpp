@@ -24,8 +24,7 @@ Deviations within(int vehicles, double position_m, double velocity_m_s) {
 /// Random states in each stretch: the inputs of the network, and slightly later the state in which the truth acts.
 /// @returns the largest ratio of error to bound
 double largest_share(const Scene& scene, const files::Network& network, const stability::Model& truth,
-                     const Deviations& deviations, const std::vector<double>& bounds,
-                     std::uint64_t seed) {
+                     const Deviations& deviations, const std::vector<double>& bounds, std::uint64_t seed) {
   Forces forces(network, truth);
   files::Random random(seed);
   double share = 0;

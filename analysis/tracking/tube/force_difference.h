@@ -39,8 +39,8 @@ class ForceDifference {
 
   const Scene* scene_;
   const Stretch* stretch_;
-  std::vector<Interval> all_;  ///< every state of the stretch
-  Interval rest_N_;  ///< the true force along z without wakes
+  std::vector<Interval> all_;                       ///< every state of the stretch
+  Interval rest_N_;                                 ///< the true force along z without wakes
   std::vector<std::shared_ptr<const Part>> parts_;  ///< a heap, worst part first
 };
 

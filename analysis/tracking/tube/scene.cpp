@@ -153,8 +153,8 @@ std::vector<Offset> Scene::offsets(const std::vector<Interval>& states, const st
 Forces_N Scene::without_wakes_N(const Stretch& stretch, const Deviations& deviations) const {
   const std::vector<Interval> states = this->states(stretch, deviations);
   const Interval* const own = &states[states.size() - kOwnState];
-  Forces_N force_N = truth_.rest_N(widened(own[0], up(network_age_s_ * own[3].mag())),
-                                   {own[1], own[2], own[3]});
+  Forces_N force_N =
+      truth_.rest_N(widened(own[0], up(network_age_s_ * own[3].mag())), {own[1], own[2], own[3]});
   if (residual_ == nullptr) return force_N;
   const std::vector<Offset> reach = offsets(states, states);
   for (std::size_t k = 0; k < 3; ++k) force_N[k] += residual_->over(reach, k);

@@ -115,11 +115,9 @@ Loads loads(const Scene& scene, const SlicedTube& tube, int vehicle) {
     if (loop.h && loop.has_lag)
       integral_m_s = up(integral_m_s + times(up(excess_N * loop.lags_s.upper), loop.h->peak));
     // A held command differs from that of the continuous law by x.
-    const double feedback =
-        up(up(acting.hold_N / mass_kg) +
-           times(loop.Kp, up(acting.met.position_m + position_error_m)) +
-           up(times(loop.Kd, up(acting.met.velocity_m_s + velocity_error_m_s)) +
-              times(loop.Ki, integral_m_s)));
+    const double feedback = up(
+        up(acting.hold_N / mass_kg) + times(loop.Kp, up(acting.met.position_m + position_error_m)) +
+        up(times(loop.Kd, up(acting.met.velocity_m_s + velocity_error_m_s)) + times(loop.Ki, integral_m_s)));
     const double lag_N = lag_error_N(loop, acting, mass_kg);
     const double acceleration_m_s2 =
         up(feedback + up(up(up(largest(acting.error_N) + lag_N) + excess_N) / mass_kg));

@@ -66,8 +66,7 @@ void KernelSum::add_stretch(const KernelStretch& stretch, double period_s) {
 
 void KernelSum::repeat(const KernelSum& before, const KernelSum& but_last, double share, double ratio) {
   for (const auto gain : {&GainNorms::rate, &GainNorms::amplitude}) {
-    const double cycle =
-        norms_.*gain - before.norms_.*gain - share * (norms_.*gain - but_last.norms_.*gain);
+    const double cycle = norms_.*gain - before.norms_.*gain - share * (norms_.*gain - but_last.norms_.*gain);
     // The sum over all cycles from the first one on, of which those up to now are in the norms.
     norms_.*gain = before.norms_.*gain + cycle / (1 - ratio);
   }
@@ -171,9 +170,7 @@ std::vector<GainNorms> sample_gains(const KernelWalk& walk, const Eigen::MatrixX
 }
 
 GainNorms command_gains(const SampledAdjoint& adjoint, const Eigen::RowVectorXd& output, bool with_own) {
-  const SampledModel& model = adjoint.model();
-  return input_gains(adjoint, output, Eigen::VectorXd::Unit(model.size() + 1, model.command_index()),
-                     with_own);
+  return input_gains(adjoint, output, adjoint.model().commanded().transpose(), with_own);
 }
 
 GainNorms input_gains(const SampledAdjoint& adjoint, const Eigen::RowVectorXd& output,

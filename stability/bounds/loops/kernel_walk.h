@@ -98,7 +98,7 @@ class KernelWalk::Run {
     while (period < until) {
       const double most = Sink::kLongest_rad / adjoint.fastest_mode(period);
       std::size_t level = 0;
-      for (double next = 2; level + 1 < walk_.powers_.size() && next <= most; next *= 2) ++level;
+      for (double length = 2; level + 1 < walk_.powers_.size() && length <= most; length *= 2) ++level;
       advance(now, level, next);
       std::swap(now, next);
       period += 1L << level;
