@@ -142,8 +142,9 @@ class KernelWalk::Run {
       while (periods > 0) periods -= swing(std::min(longest_, periods), sink);
     }
 
-    /// Walks `periods`, the end of which is that of the kernel. Sums do not need all of them: half cycles repeat, smaller
-    /// by the same ratio, up to the squared angle of a period, by which they depend on where they begin in a period.
+    /// Walks `periods`, the end of which is that of the kernel. Sums do not need all of them: half cycles repeat,
+    /// smaller by the same ratio, up to the squared angle of a period, by which they depend on where they begin in a
+    /// period.
     void walk_to_end(double periods, Sink& sink) {
       if constexpr (Sink::kSums) {
         constexpr double kResolved = 1e-12;

@@ -31,9 +31,9 @@ enum class Instants {
 /// Returns the exact norms of the sampled loop. Channel kForce: a disturbance in continuous time. Channel kCommand: an
 /// error that the loop adds to its command once per period; `rate` then means |eps_k - eps_(k-1)| <= period, `impulse`
 /// period sum|eps_k| <= 1. Computed by the adjoint: the kernel is a polynomial on each period before the output's time,
-/// and its sign changes are roots of that polynomial. With kAll the worst phase is searched on eight phases and refined.
-/// Relative error of a phase about
-/// 1e-10; the search may miss some 1e-5 of a lightly damped loop. All infinite if the spectral radius is not below 1.
+/// and its sign changes are roots of that polynomial. Relative error at one phase of the period about 1e-10. With kAll
+/// the worst phase is searched on eight phases and refined, which may miss some 1e-5 of lightly damped loops. All
+/// infinite if the spectral radius is not below 1.
 GainNorms sampled_norms(const SampledLoop& loop, Channel channel, Instants instants);
 
 /// The same for an error of an estimate, which the loop reads once per period, per m/s or per m.
