@@ -55,16 +55,22 @@ Disturbance as_command(const EstimateError& n, double scale_N) {
   return error;
 }
 
-/// @param norms gains from the error of an estimate. @param by_command bounds for a class of errors of the command.
-template <class Norms, class ByCommand>
-double velocity_part(const AxisLoop& plant, const EstimateError& n, const Norms& norms,
-                     const ByCommand& by_command) {
+DisturbanceBounds by_command(const AxisLoop& loop, const Disturbance& error) {
+  return disturbance_bounds(loop, Channel::kCommand, error);
+}
+DisturbanceBounds by_command(const SampledLoop& loop, const Disturbance& error) {
+  return disturbance_bounds(loop, Channel::kCommand, norms_of(loop, Channel::kCommand), error);
+}
+
+template <class AnyLoop>
+double velocity_part(const AnyLoop& loop, const EstimateError& n) {
   if (n.is_zero()) return 0;
-  const GainNorms gains = norms(Estimate::kVelocity);
+  const AxisLoop& plant = plant_of(loop);
+  const GainNorms gains = norms_of(loop, Estimate::kVelocity);
   const double by_amplitude = times_known(gains.amplitude, n.amplitude);
   const bool has_more = std::isfinite(std::min({n.rate, n.variation, n.impulse}));
   if (!has_more || plant.Kd == 0) return by_amplitude;
-  const DisturbanceBounds bounds = by_command(as_command(n, plant.mass_kg * plant.Kd));
+  const DisturbanceBounds bounds = by_command(loop, as_command(n, plant.mass_kg * plant.Kd));
   const double constant_m = part(n.constant, [&] { return gains.edge; });
   // The edge bound for windows includes the first rise by the amplitude, which contains the constant part.
   const double at_first_m = n.window_s > 0 ? 0 : constant_m;
@@ -72,10 +78,10 @@ double velocity_part(const AxisLoop& plant, const EstimateError& n, const Norms&
                    std::min(bounds.by_rate, bounds.by_both) + constant_m});
 }
 
-template <class AnyLoop, class Norms>
-double position_part(const AnyLoop& loop, const EstimateError& n, const Norms& norms) {
+template <class AnyLoop>
+double position_part(const AnyLoop& loop, const EstimateError& n) {
   if (n.is_zero()) return 0;
-  const GainNorms gains = norms(Estimate::kPosition);
+  const GainNorms gains = norms_of(loop, Estimate::kPosition);
   double least = times_known(gains.amplitude, n.largest());
   if (n.window_s == 0) {
     least =
@@ -88,6 +94,22 @@ double position_part(const AnyLoop& loop, const EstimateError& n, const Norms& n
                                 part(n.constant, [&] { return initial_position_gain(loop); }));
   }
   return least;
+}
+
+template <class AnyLoop>
+ErrorParts parts_of(const AnyLoop& loop, double step_gain, const OtherErrors& errors) {
+  const auto by_position = [&] { return initial_position_gain(loop); };
+  // A jump of the velocity is an impulse of force.
+  const auto by_velocity = [&] { return plant_of(loop).mass_kg * norms_of(loop, Channel::kForce).impulse; };
+  const ReferenceMotion& reference = errors.reference;
+  ErrorParts parts;
+  parts.bias_m = part(errors.step_N(), [&] { return step_gain; });
+  parts.initial_m = part(errors.position_m, by_position) + part(errors.velocity_m_s, by_velocity);
+  parts.velocity_error_m = velocity_part(loop, errors.velocity_error);
+  parts.position_error_m = position_part(loop, errors.position_error);
+  parts.reference_m = part(reference.steps_m, by_position) + part(reference.speed_steps_m_s, by_velocity) +
+                      part(reference.jerk_m_s3, [&] { return jerk_gain(loop); });
+  return parts;
 }
 
 /// Returns the smallest demand that the classes of an estimate's error give; for windows only the amplitude counts.
@@ -124,46 +146,11 @@ double EstimateError::largest() const {
 double OtherErrors::step_N() const { return std::max(std::abs(bias_N), start_N); }
 
 ErrorParts error_parts(const AxisLoop& loop, double step_gain, const OtherErrors& errors) {
-  ErrorParts parts;
-  parts.bias_m = part(errors.step_N(), [&] { return step_gain; });
-  // A jump of the velocity is an impulse of force.
-  parts.initial_m = part(errors.position_m, [&] { return initial_position_gain(loop); }) +
-                    part(errors.velocity_m_s,
-                         [&] { return loop.mass_kg * continuous_norms(loop, Channel::kForce).impulse; });
-  const auto norms = [&loop](Estimate estimate) { return continuous_norms(loop, estimate); };
-  const auto by_command = [&loop](const Disturbance& error) {
-    return disturbance_bounds(loop, Channel::kCommand, error);
-  };
-  parts.velocity_error_m = velocity_part(loop, errors.velocity_error, norms, by_command);
-  parts.position_error_m = position_part(loop, errors.position_error, norms);
-  const ReferenceMotion& reference = errors.reference;
-  parts.reference_m = part(reference.steps_m, [&] { return initial_position_gain(loop); }) +
-                      part(reference.speed_steps_m_s,
-                           [&] { return loop.mass_kg * continuous_norms(loop, Channel::kForce).impulse; }) +
-                      part(reference.jerk_m_s3, [&] { return loop.mass_kg * lag_floor(loop).rate; });
-  return parts;
+  return parts_of(loop, step_gain, errors);
 }
 
 ErrorParts error_parts(const SampledLoop& loop, double step_gain, const OtherErrors& errors) {
-  ErrorParts parts;
-  parts.bias_m = part(errors.step_N(), [&] { return step_gain; });
-  parts.initial_m =
-      part(errors.position_m, [&] { return initial_position_gain(loop); }) + part(errors.velocity_m_s, [&] {
-        return loop.plant.mass_kg * sampled_norms(loop, Channel::kForce, Instants::kAll).impulse;
-      });
-  const auto norms = [&loop](Estimate estimate) { return sampled_norms(loop, estimate, Instants::kAll); };
-  const auto by_command = [&loop](const Disturbance& error) {
-    const GainNorms gains = sampled_norms(loop, Channel::kCommand, Instants::kAll);
-    return disturbance_bounds(loop, Channel::kCommand, gains, error);
-  };
-  parts.velocity_error_m = velocity_part(loop.plant, errors.velocity_error, norms, by_command);
-  parts.position_error_m = position_part(loop, errors.position_error, norms);
-  const ReferenceMotion& reference = errors.reference;
-  const auto force = [&] { return sampled_norms(loop, Channel::kForce, Instants::kAll); };
-  parts.reference_m = part(reference.steps_m, [&] { return initial_position_gain(loop); }) +
-                      part(reference.speed_steps_m_s, [&] { return loop.plant.mass_kg * force().impulse; }) +
-                      part(reference.jerk_m_s3, [&] { return jerk_gain(loop); });
-  return parts;
+  return parts_of(loop, step_gain, errors);
 }
 
 double drift_gain(const AxisLoop& loop) {
@@ -186,9 +173,7 @@ double drift_gain(const SampledLoop& loop) {
   double most = 0;
   for (int i = 0; i <= kPhases; ++i) most = std::max(most, rate_at(i * step_s));
   // Between two phases e deviates from its chord as in initial_position_gain(); n stays that of the last sample.
-  const Eigen::Index command = adjoint.model().command_index();
-  const Eigen::RowVectorXd commanded = Eigen::RowVectorXd::Unit(adjoint.model().size() + 1, command);
-  return most + step_s * step_s / 8 * input_gains(adjoint, commanded, input).rate;
+  return most + step_s * step_s / 8 * input_gains(adjoint, adjoint.model().commanded(), input).rate;
 }
 
 double initial_position_gain(const AxisLoop& loop) {
@@ -211,9 +196,7 @@ double initial_position_gain(const SampledLoop& loop) {
   }
   // Between two phases e deviates from its chord by at most an eighth of the squared step times |e''|, and |e''| is at
   // most the largest command, since the lags average the commands.
-  const Eigen::Index command = adjoint.model().command_index();
-  const Eigen::RowVectorXd commanded = Eigen::RowVectorXd::Unit(adjoint.model().size() + 1, command);
-  return most + step_s * step_s / 8 * initial_response(adjoint, commanded).to_position;
+  return most + step_s * step_s / 8 * initial_response(adjoint, adjoint.model().commanded()).to_position;
 }
 
 double integral_demand_m_s(const AxisLoop& loop, Channel channel, const OtherErrors& errors) {
@@ -274,10 +257,6 @@ double largest_output(const SampledLoop& loop, const SampledAdjoint& adjoint,
          reference_demand(loop, errors.reference, position, speed_step, force);
 }
 
-Eigen::RowVectorXd commanded(const SampledAdjoint& adjoint) {
-  return Eigen::RowVectorXd::Unit(adjoint.model().size() + 1, adjoint.model().command_index());
-}
-
 }  // namespace
 
 double integral_demand_m_s(const SampledLoop& loop, Channel channel, const OtherErrors& errors) {
@@ -289,13 +268,13 @@ double integral_demand_m_s(const SampledLoop& loop, Channel channel, const Other
 double effort_gain(const SampledLoop& loop) {
   const SampledAdjoint adjoint(loop);
   if (!adjoint.is_stable()) return kInfinity;
-  return force_gains(adjoint, commanded(adjoint)).amplitude;
+  return force_gains(adjoint, adjoint.model().commanded()).amplitude;
 }
 
 double effort_N(const SampledLoop& loop, const OtherErrors& errors, Channel channel) {
   const SampledAdjoint adjoint(loop);
   if (!adjoint.is_stable()) return kInfinity;
-  return loop.plant.mass_kg * largest_output(loop, adjoint, commanded(adjoint), channel, errors);
+  return loop.plant.mass_kg * largest_output(loop, adjoint, adjoint.model().commanded(), channel, errors);
 }
 
 double effort_N(const AxisLoop& loop, const OtherErrors& errors, Channel channel) {

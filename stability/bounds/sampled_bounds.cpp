@@ -52,6 +52,7 @@ struct Kernel {
 
 /// Fills a kernel; a sink of KernelWalk::run().
 struct FillKernel {
+  static constexpr bool kSums = false;
   static constexpr double kLongest_rad = 0.02, kLongestSwing_rad = 0.02;
   Kernel kernel;
   double period_s, ratio;
@@ -92,8 +93,7 @@ Kernel kernel_of(const SampledAdjoint& adjoint, Channel channel, double phase_s,
     KernelWalk::of_force(adjoint).run(output, fill);
   } else {
     // An error of one period is a force held for that period, with the same int |eps| dt.
-    const SampledModel& model = adjoint.model();
-    const Eigen::VectorXd input = Eigen::VectorXd::Unit(model.size() + 1, model.command_index());
+    const Eigen::VectorXd input = adjoint.model().commanded().transpose();
     const double own = output.dot(input) / h;
     if (with_own) kernel.add(own, own, h);
     KernelWalk::of_held(adjoint, input).run(output, fill);

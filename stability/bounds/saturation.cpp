@@ -13,12 +13,9 @@
 namespace swarmcert::stability {
 namespace {
 
-AxisLoop& plant_of_loop(AxisLoop& loop) { return loop; }
-AxisLoop& plant_of_loop(SampledLoop& loop) { return loop.plant; }
-
 template <class AnyLoop>
 double integral_replaced_N(AnyLoop& loop, double limit_m_s) {
-  AxisLoop& plant = plant_of_loop(loop);
+  AxisLoop& plant = plant_of(loop);
   Disturbance integral;
   integral.amplitude_N = plant.mass_kg * plant.Ki * limit_m_s;
   plant.Ki = 0;
@@ -184,7 +181,8 @@ Saturation saturation_of(const FlownLoop& loop, const PerAxis& feedback_N, doubl
   return result;
 }
 
-Saturation saturation(const FlownLoop& loop, const DisturbanceSource& source, const InitialError& initial) {
+Saturation thrust_demand(const FlownLoop& loop, const DisturbanceSource& source,
+                         const InitialError& initial) {
   PerAxis feedback{};
   for (int axis = 0; axis < 3; ++axis)
     feedback[static_cast<std::size_t>(axis)] = feedback_N(loop, source, initial, axis);
@@ -192,7 +190,12 @@ Saturation saturation(const FlownLoop& loop, const DisturbanceSource& source, co
   if (!objection.empty()) feedback[0] = feedback[1] = kInfinity;
   Saturation result = saturation_of(loop, feedback, source.thrust_ratio_error);
   result.why = objection;
-  if (result.is_proved() || !objection.empty()) return result;
+  return result;
+}
+
+Saturation saturation(const FlownLoop& loop, const DisturbanceSource& source, const InitialError& initial) {
+  Saturation result = thrust_demand(loop, source, initial);
+  if (result.is_proved() || !result.why.empty()) return result;
   refute(loop, source, result);
   if (result.verdict == Saturation::Verdict::kUndecided) result.why = why_undecided(loop, source, result);
   return result;

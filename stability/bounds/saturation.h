@@ -38,8 +38,13 @@ struct Saturation {
   double beyond_linear_N() const;
 };
 
-/// Refuted only with an input of the declared class that exceeds a limit: the worst force of the linear loop, simulated
-/// with the clamp, or a ramp of a class that bounds nothing but the rate.
+/// Returns the forces that the declared inputs may command, proved to be within the limits or undecided; `why` is that
+/// of attitude_objection().
+Saturation thrust_demand(const FlownLoop& loop, const DisturbanceSource& source, const InitialError& initial);
+
+/// The same, with the reason where it is not proved. Refuted only with an input of the declared class that exceeds a
+/// limit: the worst force of the linear loop, simulated with the clamp, or a ramp of a class that bounds nothing but
+/// the rate.
 Saturation saturation(const FlownLoop& loop, const DisturbanceSource& source, const InitialError& initial);
 
 /// Judges commanded forces by U alone; an undecided verdict has no reason yet.

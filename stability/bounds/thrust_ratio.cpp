@@ -24,10 +24,10 @@ UncertainPlant ratio_only(const AxisLoop& loop, double ratio_error) {
 }
 
 template <class AnyLoop>
-ThrustRatioGains gains_of(const AnyLoop& loop, const AxisLoop& plant, Channel channel, double ratio_error,
-                          const GainNorms& of_force) {
+ThrustRatioGains gains_of(const AnyLoop& loop, Channel channel, double ratio_error) {
   ThrustRatioGains gains;
-  gains.of_class = largest(uncertain_norms(loop, ratio_only(plant, ratio_error), channel));
+  const GainNorms of_force = norms_of(loop, Channel::kForce);
+  gains.of_class = largest(uncertain_norms(loop, ratio_only(plant_of(loop), ratio_error), channel));
   const double by_feedback = ratio_error * effort_gain(loop);
   gains.force_per_N = by_feedback < 1 ? ratio_error / (1 - by_feedback) : kInfinity;
   gains.amplitude = of_force.amplitude;
@@ -53,9 +53,6 @@ double demand_m_s(const AnyLoop& loop, const ThrustRatioGains& gains, const Dist
   const double constant_m_s = constant.bias_N == 0 ? 0 : integral_demand_m_s(loop, Channel::kForce, constant);
   return constant_m_s + (feedback_N == 0 ? 0 : integral_gain(loop) * gains.force_per_N * feedback_N);
 }
-
-AxisLoop& plant_of(AxisLoop& loop) { return loop; }
-AxisLoop& plant_of(SampledLoop& loop) { return loop.plant; }
 
 template <class AnyLoop>
 ClampBounds clamped(const AnyLoop& loop, Channel channel, const ClampBounds& exact,
@@ -95,12 +92,11 @@ ClampBounds clamp_bounds(const SampledLoop& loop, Channel channel, const ClampBo
 }
 
 ThrustRatioGains thrust_ratio_gains(const AxisLoop& loop, Channel channel, double ratio_error) {
-  return gains_of(loop, loop, channel, ratio_error, continuous_norms(loop, Channel::kForce));
+  return gains_of(loop, channel, ratio_error);
 }
 
 ThrustRatioGains thrust_ratio_gains(const SampledLoop& loop, Channel channel, double ratio_error) {
-  return gains_of(loop, loop.plant, channel, ratio_error,
-                  sampled_norms(loop, Channel::kForce, Instants::kAll));
+  return gains_of(loop, channel, ratio_error);
 }
 
 DisturbanceBounds disturbance_bounds(const ThrustRatioGains& gains, const Disturbance& disturbance) {

@@ -39,8 +39,8 @@ Eigen::Vector3d direction(int index, files::Random& random) {
 /// kernel g(t) from rate to eta' p~. By duality z' = A' z, z(0) = eta in p~, and g is the integral of B' z, since the
 /// rate is integrated once before it acts.
 RateDisturbance worst_linear(const IssJudge& judge, const Eigen::Vector3d& eta) {
-  const auto a = judge.loop().matrix();
-  PositionLoop::State z = PositionLoop::State::Zero();
+  const LoopMatrix& a = judge.matrix();
+  LoopState z = LoopState::Zero();
   z.head<3>() = eta;
   Eigen::Vector3d kernel = Eigen::Vector3d::Zero();
   constexpr int kSteps = 100;  // per piece
@@ -48,10 +48,10 @@ RateDisturbance worst_linear(const IssJudge& judge, const Eigen::Vector3d& eta) 
   std::vector<Eigen::Vector3d> rates;
   for (int piece = 0; piece < kPieces; ++piece) {
     for (int step = 0; step < kSteps; ++step) {
-      const PositionLoop::State k1 = a.transpose() * z, k2 = a.transpose() * (z + h / 2 * k1),
-                                k3 = a.transpose() * (z + h / 2 * k2), k4 = a.transpose() * (z + h * k3);
-      const PositionLoop::State next = z + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4);
-      kernel -= h / 2 * (z + next).segment<3>(3) / judge.loop().mass_kg();
+      const LoopState k1 = a.transpose() * z, k2 = a.transpose() * (z + h / 2 * k1),
+                      k3 = a.transpose() * (z + h / 2 * k2), k4 = a.transpose() * (z + h * k3);
+      const LoopState next = z + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4);
+      kernel -= h / 2 * (z + next).segment<3>(3) / judge.mass_kg();
       z = next;
       if (step == kSteps / 2) rates.push_back(kernel);
     }
@@ -110,7 +110,7 @@ IssRun make_run(const IssJudge& judge, int index, std::uint64_t seed) {
       run.position_m = size * random_direction(random);
       run.velocity_m_s = 0.05 * random.uniform() * random_direction(random);
       run.disturbance.bias_W_N =
-          0.05 * judge.loop().mass_kg() * kGravity_m_s2 * random.uniform() * random_direction(random);
+          0.05 * judge.mass_kg() * kGravity_m_s2 * random.uniform() * random_direction(random);
     }
   }
   return run;
@@ -174,10 +174,7 @@ IssRun optimise(const IssJudge& judge, int evaluations, std::uint64_t seed) {
 }
 
 /// Returns the decay rate in 1/s of the slowest mode of the linear loop; not positive if it does not decay.
-double slowest_decay(const PositionLoop& loop) {
-  const Eigen::Matrix<double, PositionLoop::kSize, PositionLoop::kSize> a = loop.matrix();
-  return -a.eigenvalues().real().maxCoeff();
-}
+double slowest_decay(const FlownLoop& loop) { return -loop.matrix().eigenvalues().real().maxCoeff(); }
 
 /// Returns what one would use as the ball without checking whether the theorem applies.
 double naive_ball(const FlownLoop& flown) {
@@ -234,8 +231,7 @@ IssCheck check_iss(const FlownLoop& flown, const IssOptions& options) {
   check.why_not = theorem.why_not;
   check.delay_left_out_s = flown.gains.delay_s;
   check.has_ball = theorem.composite.has_value();
-  const PositionLoop loop(flown);
-  const double decay_1_s = slowest_decay(loop);
+  const double decay_1_s = slowest_decay(flown);
   check.unstable = !(decay_1_s > 1e-9);
   // After 14 time constants even a triple pole has settled to 1e-4.
   check.duration_s = check.unstable ? 20 : std::clamp(14 / decay_1_s, 0.1, 200.0);

@@ -34,8 +34,38 @@ double TransientTable::at(int k, const std::array<double, 4>& sizes) const {
 }
 
 IssJudge::IssJudge(const FlownLoop& loop, const IssCheck& check, const Theorem& theorem)
-    : loop_(loop), check_(check), theorem_(theorem) {
+    : matrix_(loop.matrix()),
+      law_(loop.law()),
+      limit_m_s_{loop.integral_limit_m_s(0), loop.integral_limit_m_s(1), loop.integral_limit_m_s(2)},
+      mass_kg_(loop.plant.mass_kg),
+      thrust_N_(loop.thrust_range_N()),
+      check_(check),
+      theorem_(theorem) {
   if (check_.has_ball) table_.emplace(theorem, loop.plant.mass_kg, check_.duration_s);
+}
+
+LoopState IssJudge::derivative(const LoopState& x, const Eigen::Vector3d& eps_W_N) const {
+  LoopState result = matrix_ * x;
+  result.segment<3>(3) -= eps_W_N / mass_kg_;
+  return result;
+}
+
+const char* IssJudge::left_hypothesis(const LoopState& x) const {
+  /// Below this fraction of the weight, the direction of the commanded force is meaningless.
+  constexpr double kLeastShare = 0.01;
+  const Eigen::Vector3d integral = x.segment<3>(6);
+  for (int i = 0; i < 3; ++i) {
+    if (!(std::abs(integral[i]) < limit_m_s_[static_cast<std::size_t>(i)]))
+      return "the integral reaches its clamp";
+  }
+  const double weight_N = mass_kg_ * kGravity_m_s2;
+  const Eigen::Vector3d force =
+      Eigen::Vector3d(0, 0, weight_N) -
+      mass_kg_ * (law_.Kp * x.head<3>() + law_.Kd * x.segment<3>(3) + law_.Ki * integral);
+  const double size_N = force.stableNorm();
+  if (!(size_N <= thrust_N_.upper && size_N >= thrust_N_.lower)) return "the thrust saturates";
+  if (size_N < kLeastShare * weight_N) return "the commanded force is near zero";
+  return force.z() > 0 ? nullptr : "the commanded force tilts by 90 degrees";
 }
 
 void IssJudge::judge(IssRun* run) const {
@@ -55,23 +85,27 @@ void IssJudge::integrate(IssRun* run) const {
   double from_s = 0;
   OdeIntegrator integrator(
       OdeMethod::kRungeKutta,
-      [&](double t, const double* x, double* dx) {
+      [&](double t, const double* at, double* dx) {
+        const Eigen::Map<const LoopState> x(at);
         // Checked at every evaluation, so that nothing is missed between samples, although the last step may be a trial
         // step.
         if (run->left.empty()) {
-          if (const char* const left = loop_.left_hypothesis(x)) {
+          if (const char* const left = left_hypothesis(x)) {
             run->left = left;
             run->left_at_s = t;
           }
         }
+        Eigen::Map<LoopState> slope(dx);
         if (!run->left.empty()) {  // the run is over: freeze the state, so that it ends at once
-          std::fill(dx, dx + PositionLoop::kSize, 0.0);
+          slope.setZero();
           return;
         }
-        loop_.derivative(x, eps + (t - from_s) * rate, dx);
+        slope = derivative(x, eps + (t - from_s) * rate);
       },
-      1e-9, std::vector<double>(PositionLoop::kSize, 1e-10 * check_.ball_m));
-  PositionLoop::State state = loop_.start(run->position_m, run->velocity_m_s);
+      1e-9, std::vector<double>(15, 1e-10 * check_.ball_m));
+  LoopState state = LoopState::Zero();
+  state.head<3>() = run->position_m;
+  state.segment<3>(3) = run->velocity_m_s;
   const bool from_rest =
       run->position_m.isZero(0) && run->velocity_m_s.isZero(0) && disturbance.bias_W_N.isZero(0);
   const std::array<double, 4> sizes = start_sizes(*run, state);
@@ -91,7 +125,7 @@ void IssJudge::integrate(IssRun* run) const {
       eps += (until_s - from_s) * rate;
       from_s = until_s;
       rate = rate_of(++piece);
-      state = Eigen::Map<const PositionLoop::State>(integrator.state());
+      state = Eigen::Map<const LoopState>(integrator.state());
       integrator.start(until_s, state.data());
     }
     const double limit_s = piece < disturbance.until_s.size() ? disturbance.until_s[piece] : 1e300;
@@ -103,11 +137,9 @@ void IssJudge::integrate(IssRun* run) const {
   }
 }
 
-std::array<double, 4> IssJudge::start_sizes(const IssRun& run, const PositionLoop::State& state) const {
+std::array<double, 4> IssJudge::start_sizes(const IssRun& run, const LoopState& state) const {
   if (!check_.has_ball) return {};
-  double derivative[PositionLoop::kSize];
-  loop_.derivative(state.data(), run.disturbance.bias_W_N, derivative);
-  const Eigen::Map<const Eigen::Vector3d> acceleration(derivative + 3);
+  const Eigen::Vector3d acceleration = derivative(state, run.disturbance.bias_W_N).segment<3>(3);
   const Eigen::Matrix3d lambda = to_eigen(theorem_.composite->Lambda_1_s);
   const Eigen::Vector3d s_dot =
       acceleration + 2 * lambda * run.velocity_m_s + lambda * lambda * run.position_m;

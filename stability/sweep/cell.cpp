@@ -89,7 +89,7 @@ class Quantities {
 
   /// Saturation under [disturbance], of this axis alone.
   const Saturation& thrust() {
-    if (!thrust_) thrust_ = saturation(loop_, source_, {});
+    if (!thrust_) thrust_ = thrust_demand(loop_, source_, {});
     return *thrust_;
   }
 

@@ -38,12 +38,7 @@ ExactNumber exact_number(double value) {
   return std::isnan(value) ? "nan" : value > 0 ? "inf" : "-inf";
 }
 
-struct NamedAxis {
-  std::string name;
-  std::vector<double> values;
-};
-
-void describe_axis(files::Record& record, const NamedAxis& axis) {
+void describe_axis(files::Record& record, const GridAxis& axis) {
   record.field("name", axis.name, "Of the parameter.");
   record.field("values", axis.values, "In the unit of the parameter.");
 }
@@ -58,14 +53,12 @@ void describe_cell(files::Record& record, const Cell& cell) {
 
 void describe_shard(files::Record& record, const Grid& grid, const files::Shard& shard,
                     const std::vector<Cell>& cells) {
-  std::vector<NamedAxis> axes;
-  for (const GridAxis& axis : grid.axes) axes.push_back({axis.name, axis.values});
   record.constant("schema", kShardSchema, "Name and version of this format.");
   record.field("grid", grid.path, "The grid.toml.");
   record.field("grid_sha256", grid.sha256, "SHA-256 of the grid.toml.");
   record.field("gains_sha256", grid.gains.sha256, "SHA-256 of the gains.toml.");
   record.field("model_sha256", grid.model.sha256, "SHA-256 of the model.toml.");
-  record.list("axes", axes, "The varied parameters in the order of the grid.", describe_axis);
+  record.list("axes", grid.axes, "The varied parameters in the order of the grid.", describe_axis);
   record.field("compute", grid.compute, "What was computed in every cell.");
   record.field("pareto", grid.pareto, "The quantities that span the Pareto front.");
   record.field("shard", shard.index, "Number of this part, from 0.");
@@ -230,14 +223,13 @@ MergedSweep read_shards(const std::string& folder) {
   MergedSweep sweep;
   sweep.files = paths;
   const long total = reading(paths.front(), [&] {
-    sweep.grid_path = first.at("grid").get<std::string>();
-    sweep.grid_sha256 = first.at("grid_sha256").get<std::string>();
-    for (const Json& axis : first.at("axes")) {
-      sweep.axis_names.push_back(axis.at("name").get<std::string>());
-      sweep.axis_values.push_back(axis.at("values").get<std::vector<double>>());
-    }
-    sweep.compute = first.at("compute").get<std::vector<std::string>>();
-    sweep.pareto = first.at("pareto").get<std::vector<std::string>>();
+    sweep.grid.path = first.at("grid").get<std::string>();
+    sweep.grid.sha256 = first.at("grid_sha256").get<std::string>();
+    for (const Json& axis : first.at("axes"))
+      sweep.grid.axes.push_back(
+          {axis.at("name").get<std::string>(), axis.at("values").get<std::vector<double>>()});
+    sweep.grid.compute = first.at("compute").get<std::vector<std::string>>();
+    sweep.grid.pareto = first.at("pareto").get<std::vector<std::string>>();
     return first.at("total").get<long>();
   });
   for (long i = 0; i < total; ++i) {
@@ -247,10 +239,7 @@ MergedSweep read_shards(const std::string& folder) {
                       "run its shard with --resume"});
   }
   for (auto& [index, cell] : cells) sweep.cells.push_back(std::move(cell));
-  Grid grid;  // the front needs names only
-  grid.compute = sweep.compute;
-  grid.pareto = sweep.pareto;
-  sweep.front = pareto_front(grid, sweep.cells);
+  sweep.front = pareto_front(sweep.grid, sweep.cells);
   return sweep;
 }
 
@@ -274,13 +263,12 @@ NamedNumbers named(const std::vector<std::string>& names, const std::vector<doub
 
 std::vector<Point> points_of(const MergedSweep& sweep) {
   const std::set<long> front(sweep.front.begin(), sweep.front.end());
-  Grid grid;
-  for (std::size_t i = 0; i < sweep.axis_names.size(); ++i)
-    grid.axes.push_back({sweep.axis_names[i], sweep.axis_values[i]});
+  std::vector<std::string> axes;
+  for (const GridAxis& axis : sweep.grid.axes) axes.push_back(axis.name);
   std::vector<Point> points;
   for (const Cell& cell : sweep.cells)
-    points.push_back({cell.index, named(sweep.axis_names, grid.at(cell.index)),
-                      named(sweep.compute, cell.values), cell.infeasible, front.count(cell.index) == 1});
+    points.push_back({cell.index, named(axes, sweep.grid.at(cell.index)),
+                      named(sweep.grid.compute, cell.values), cell.infeasible, front.count(cell.index) == 1});
   return points;
 }
 
@@ -298,20 +286,17 @@ void describe_point(files::Record& record, const Point& point) {
 
 void describe_file(files::Record& record, const MergedSweep& sweep) {
   record.constant("schema", kPointsSchema, "Name and version of this format.");
-  record.field("grid", sweep.grid_path, "The grid.toml.");
-  record.field("grid_sha256", sweep.grid_sha256, "SHA-256 of the grid.toml.");
+  record.field("grid", sweep.grid.path, "The grid.toml.");
+  record.field("grid_sha256", sweep.grid.sha256, "SHA-256 of the grid.toml.");
   describe(record, sweep);
 }
 
 }  // namespace
 
 void describe(files::Record& record, const MergedSweep& sweep) {
-  std::vector<NamedAxis> axes;
-  for (std::size_t i = 0; i < sweep.axis_names.size(); ++i)
-    axes.push_back({sweep.axis_names[i], sweep.axis_values[i]});
-  record.list("axes", axes, "The varied parameters in the order of the grid.", describe_axis);
-  record.field("compute", sweep.compute, "What was computed in every cell.");
-  record.field("pareto", sweep.pareto, "The quantities that span the Pareto front.");
+  record.list("axes", sweep.grid.axes, "The varied parameters in the order of the grid.", describe_axis);
+  record.field("compute", sweep.grid.compute, "What was computed in every cell.");
+  record.field("pareto", sweep.grid.pareto, "The quantities that span the Pareto front.");
   record.list("points", points_of(sweep), "Every cell of the grid.", describe_point);
 }
 

@@ -38,11 +38,8 @@ SweepOutcome run_shard(const Grid& grid, const std::string& folder, const SweepO
 /// A whole sweep, read back from its shards.
 struct MergedSweep {
   std::vector<std::string> files;  ///< the shards
-  std::string grid_path, grid_sha256;
-  std::vector<std::string> axis_names;
-  std::vector<std::vector<double>> axis_values;
-  std::vector<std::string> compute, pareto;
-  std::vector<Cell> cells;  ///< every cell of the grid, by index
+  Grid grid;                       ///< path, sha256, axes, compute and pareto alone
+  std::vector<Cell> cells;         ///< every cell of the grid, by index
   std::vector<long> front;
 };
 

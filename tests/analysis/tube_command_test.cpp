@@ -31,7 +31,7 @@ std::string bound(const std::string& gains) {
          "/stability/models/crazyflie-small.toml";
 }
 
-TEST(TubeCommand, ProvesATubeAroundASwapAndReportsItBesideLipschitzBounds) {
+TEST(TubeCommand, ProvesATubeAroundASwapAndReportsIt) {
   const ScratchFolder folder;
   const std::string command = bound("composite.toml") + kNetwork + truth_without_lag(folder) +
                               " --tube --task swap --duration 4.5 --report r";
@@ -48,28 +48,9 @@ TEST(TubeCommand, ProvesATubeAroundASwapAndReportsItBesideLipschitzBounds) {
   EXPECT_GT(radius_m, 0);
   for (const Json& r : tube["radius_xyz_m"]) EXPECT_LE(r.get<double>(), radius_m);
   ASSERT_EQ(tube["radii"].size(), 2u);
-  ASSERT_EQ(tube["bounds"].size(), 2u);
-  for (const Json& b : tube["bounds"]) {
-    for (const char* const name : {"rate", "amplitude", "edges", "impulse", "slices"})
-      EXPECT_GE(b[name].get<double>(), b["minimum"].get<double>()) << name;
-    EXPECT_LE(b["minimum"].get<double>(), tube["radius_xyz_m"][2].get<double>());
-  }
-  double last = 0;
-  for (const char* const row : {"local", "global", "product"}) {
-    const Json& constants = tube[row]["lipschitz"];
-    const double constant =
-        (constants["position_N_m"].is_number() ? constants["position_N_m"] : constants["all_N"])
-            .get<double>();
-    EXPECT_GE(constant, last) << row;
-    last = constant;
-    EXPECT_EQ(tube[row]["radius_m"].is_number(), tube[row]["verdict"] == "proved");
-    if (tube[row]["radius_m"].is_null()) {
-      EXPECT_FALSE(tube[row]["why"].get<std::string>().empty());
-    }
-  }
+  for (const Json& r : tube["radii"]) EXPECT_GT(r["force_error_N"].get<double>(), 0);
   for (const Json& at : tube["at"])
     for (const Json& e : at["error_z_m"]) EXPECT_LE(e.get<double>(), tube["radius_xyz_m"][2].get<double>());
-  EXPECT_GE(tube["one_radius"]["radius_m"].get<double>(), radius_m);
   ASSERT_EQ(tube["slices"].size(), tube["at"].size());
   for (std::size_t n = 0; n < tube["slices"].size(); ++n) {
     const Json& vehicles = tube["slices"][n]["error_xyz_m"];
@@ -103,7 +84,6 @@ TEST(TubeCommand, ProvesTheGainsThatFlewAndThreeVehicles) {
     ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
     const Json tube = files::parse_json(read_text(folder / "out.json"), "out.json")["local_tube"];
     EXPECT_EQ(tube["verdict"], "proved") << all;
-    EXPECT_EQ(tube["one_radius"]["verdict"], "inconclusive");
     // composite.toml states no rate.
     EXPECT_EQ(tube["loop"], rest.empty() ? "sampled" : "continuous");
     EXPECT_LT(tube["radius_m"].get<double>(), 0.1);
@@ -206,7 +186,6 @@ TEST(TubeCommand, ATruthThatFlightsMeasuredKeepsFurtherFlightsInItsTube) {
   EXPECT_GE(inside, 27);
   // The ranges include accelerometer noise as if it were a force: 0.12 m/s^2 of noise widens the tube to several
   // times that of the truth alone.
-  // times that of the truth alone.
   EXPECT_LT(tube["radius_xyz_m"][2].get<double>(), 8 * largest_m);
 }
 
@@ -304,7 +283,7 @@ TEST(TubeCommand, WhereNothingIsProvedTheExitCodeAndTheReasonSaySo) {
   const Json tube = files::parse_json(read_text(folder / "out.json"), "out.json")["local_tube"];
   EXPECT_EQ(tube["verdict"], "inconclusive");
   EXPECT_TRUE(tube["radius_m"].is_null());
-  EXPECT_NE(tube["why"].get<std::string>().find("f_hat"), std::string::npos);
+  EXPECT_NE(tube["why"].get<std::string>().find("errors could exceed 0.5 m"), std::string::npos);
   EXPECT_TRUE(tube["slices"].empty());
 }
 

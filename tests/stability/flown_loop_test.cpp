@@ -141,6 +141,9 @@ TEST(FlownLoop, WorstForcesOfAllAxesTogetherSaturateTheShippedLoopAtTheAmplitude
   EXPECT_EQ(found.verdict, Saturation::Verdict::kRefuted) << found.why;
   EXPECT_GE(found.most_N, 1.2);
   EXPECT_NEAR(found.available_N.upper, 0.843, 1e-3);
+  const Saturation demand = thrust_demand(loop, amplitude_of(0.097), {});
+  EXPECT_EQ(demand.verdict, Saturation::Verdict::kUndecided) << "no counterexample is looked for";
+  EXPECT_EQ(demand.margin_N(), found.margin_N());
   // Its horizontal axes alone command more than the rotors give.
   DisturbanceSource sideways = amplitude_of(0);
   sideways.axis[0].amplitude_N = sideways.axis[1].amplitude_N = 0.097;

@@ -70,5 +70,32 @@ TEST(KernelWalk, SumsOverStridesAreThoseOverSinglePeriods) {
   EXPECT_GT(others, 0);
 }
 
+/// Most half cycles of such loops are not walked but repeat those before.
+TEST(KernelWalk, HalfCyclesOfALightlyDampedLoopSumToThoseOfSinglePeriods) {
+  files::Random random(5);
+  int compared = 0;
+  for (int run = 0; run < 400 && compared < 12; ++run) {
+    SampledLoop loop = random_loop(random);
+    loop.plant.Kd = 0.05 + 0.2 * random.uniform();
+    loop.plant.lags_s.clear();
+    const SampledAdjoint adjoint(loop);
+    if (!adjoint.is_stable() || !adjoint.last_pair() || adjoint.periods() > 200'000) continue;
+    const double half_cycles =
+        static_cast<double>(adjoint.periods()) * std::arg(adjoint.last_pair()->mode) / 3.2;
+    if (half_cycles < 200) continue;
+    SCOPED_TRACE(run);
+    ++compared;
+    const Eigen::RowVectorXd output = adjoint.output_after_control(0);
+    KernelSum single;
+    single.add_linear(0, 1, 0);
+    adjoint.force_kernel(
+        output, [&](double start, double slope, double length) { single.add_linear(start, slope, length); },
+        [](double, double, double, double) {});
+    expect_near(force_gains(KernelWalk::of_force(adjoint), output, {0}).front(), single.norms(),
+                loop.plant.Ki > 0);
+  }
+  EXPECT_EQ(compared, 12);
+}
+
 }  // namespace
 }  // namespace swarmcert::stability

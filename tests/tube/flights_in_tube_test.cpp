@@ -29,7 +29,6 @@ Campaign fly_in_tube(int flights, const EstimateErrors& estimates, const std::op
   LocalTubeOptions options;
   options.estimates = estimates;
   options.motor_lag_s = motor_lag_s;
-  options.nodes = 1;
   options.residual = residual;
   const LocalTube tube = local_tube(loop, truth, network, *task, 2, options);
   Campaign campaign;
@@ -37,11 +36,11 @@ Campaign fly_in_tube(int flights, const EstimateErrors& estimates, const std::op
   if (!tube.proved) return campaign;
   tests::AxesFlight flight(loop, truth, network, *task, 2, true, estimates, motor_lag_s, residual);
   files::Random random(2026);
-  const double radius_z_m = tube.tube.radius_m(2);
+  const double radius_z_m = largest_position_m(tube.whole, 2);
   for (int i = 0; i < flights; ++i) {
     flight.fly(random, [&](double t, int vehicle, const std::array<double, 3>& e, const auto&) {
       const auto at = static_cast<std::size_t>(std::floor((t - 1e-9) / tube.slice_s));
-      const Deviation& slice = tube.slices[at][static_cast<std::size_t>(vehicle)];
+      const Deviation& slice = tube.sliced.slices[at][static_cast<std::size_t>(vehicle)];
       for (std::size_t k = 0; k < 3; ++k) {
         const Interval range = slice.position_m[k];
         const double middle = (range.lower + range.upper) / 2;

@@ -114,7 +114,7 @@ TEST(SlicedTube, SampledTubesHoldSampledFlightsAndAreLittleWiderThanContinuousOn
                         kSlice_s, is_sampled);
       const SlicedTube tube = sliced_tube(scene, boxes(8), kTolerance_N);
       ASSERT_TRUE(tube.proved) << tube.why;
-      for (int k = 0; k < 3; ++k) radius_m[is_sampled ? 1 : 0][k] = tube.radii().largest_position_m(k);
+      for (int k = 0; k < 3; ++k) radius_m[is_sampled ? 1 : 0][k] = largest_position_m(tube.whole(), k);
       if (!is_sampled) continue;
       const Seen seen = fly(loop, tests::truth_model(), *task, tube, scene.motion().slice_s, 3, true);
       EXPECT_EQ(seen.outside, 0) << "of " << seen.looks;
@@ -131,16 +131,16 @@ TEST(SlicedTube, OverTheDefaultSwapTheSampledTubeIsAtMostOneAndAHalfTimesTheCont
   const files::Network network = tests::demo_network();
   const auto task = stability::make_task("swap", {2, 0, 0});
   const stability::FlownLoop loop = tests::loop_of("crazyflie-small");
-  Radii radii[2];
+  Deviations whole[2];
   for (const bool is_sampled : {false, true}) {
     const Scene scene(loop, tests::truth_model(), network, *task, 2, network_age_s(loop.gains, is_sampled),
                       kSlice_s, is_sampled);
     const SlicedTube tube = sliced_tube(scene, boxes(32), kTolerance_N);
     ASSERT_TRUE(tube.proved) << tube.why;
-    radii[is_sampled ? 1 : 0] = tube.radii();
+    whole[is_sampled ? 1 : 0] = tube.whole();
   }
   for (int k = 0; k < 3; ++k)
-    EXPECT_LE(radii[1].largest_position_m(k), 1.5 * radii[0].largest_position_m(k)) << k;
+    EXPECT_LE(largest_position_m(whole[1], k), 1.5 * largest_position_m(whole[0], k)) << k;
 }
 
 TEST(SlicedTube, OfAnIntervalOfLagsHoldsFlightsOfAnyLagInItAndIsLittleWider) {
@@ -161,7 +161,7 @@ TEST(SlicedTube, OfAnIntervalOfLagsHoldsFlightsOfAnyLagInItAndIsLittleWider) {
     ASSERT_TRUE(one.proved) << one.why;
     ASSERT_TRUE(all.proved) << all.why;
     for (int k = 0; k < 3; ++k) {
-      const double ratio = all.radii().largest_position_m(k) / one.radii().largest_position_m(k);
+      const double ratio = largest_position_m(all.whole(), k) / largest_position_m(one.whole(), k);
       EXPECT_GT(ratio, 1.02) << k;
       EXPECT_LT(ratio, 1.15) << k;
     }
@@ -178,15 +178,15 @@ TEST(SlicedTube, OverTheDefaultSwapTheTubeOfAnIntervalOfLagsIsAtMostOneAndAHalfT
   const auto task = stability::make_task("swap", {2, 0, 0});
   const stability::FlownLoop loop = tests::loop_of("crazyflie-small");
   const double lag_s = loop.gains.motor_lag_s;
-  const auto radii_of = [&](const Interval& lags_s) {
+  const auto whole_of = [&](const Interval& lags_s) {
     const Scene scene(loop, tests::truth_model(), network, *task, 2, network_age_s(loop.gains, true),
                       kSlice_s, true, {}, lags_s);
     const SlicedTube tube = sliced_tube(scene, boxes(32), kTolerance_N);
     EXPECT_TRUE(tube.proved) << tube.why;
-    return tube.radii();
+    return tube.whole();
   };
-  const Radii one = radii_of(lag_s), all = radii_of({0.9 * lag_s, 1.1 * lag_s});
-  for (int k = 0; k < 3; ++k) EXPECT_LE(all.largest_position_m(k), 1.5 * one.largest_position_m(k)) << k;
+  const Deviations one = whole_of(lag_s), all = whole_of({0.9 * lag_s, 1.1 * lag_s});
+  for (int k = 0; k < 3; ++k) EXPECT_LE(largest_position_m(all, k), 1.5 * largest_position_m(one, k)) << k;
 }
 
 TEST(SlicedTube, HoldsFlightsWhoseEstimatesAreWrongWithinTheirBounds) {
@@ -246,7 +246,7 @@ TEST(SlicedTube, FinerSlicesAreNeverWiderAndLaterSlicesChangeNothingBefore) {
     const Scene scene(loop, truth, network, *task, 2, network_age_s(loop.gains), slice_s);
     const SlicedTube tube = sliced_tube(scene, boxes(8), kTolerance_N);
     ASSERT_TRUE(tube.proved) << slice_s << " " << tube.why;
-    const double radius_m = tube.radii().largest_position_m(2);
+    const double radius_m = largest_position_m(tube.whole(), 2);
     EXPECT_LT(radius_m, last_m) << slice_s;
     last_m = radius_m;
     const auto shorter = stability::make_task("swap", {2, 3, 0});

@@ -125,21 +125,22 @@ TEST(TruthForce, TheRestCoversDragGroundAndConstantForces) {
   const TruthForce truth(model, 0.6);
   files::Random random(7);
   for (int i = 0; i < 200; ++i) {
-    const Interval velocity[3] = {{-0.3, 0.1}, {0.2, 0.4}, {-0.1, 0.1}};
-    const TruthForce::Rest rest = truth.rest({0.05, 0.6}, velocity, 1, 5);
+    const std::array<Interval, 3> velocity = {Interval(-0.3, 0.1), Interval(0.2, 0.4), Interval(-0.1, 0.1)};
+    const std::array<Interval, 3> rest_N = truth.rest_N({0.05, 0.6}, velocity);
     Instant now;
     now.mass_kg = model.mass_kg;
     now.thrust_N = between(random, 0, 0.6);
     now.p_W_m = {0, 0, between(random, 0.05, 0.6)};
-    for (int k = 0; k < 3; ++k) now.v_W_m_s[k] = between(random, velocity[k].lower, velocity[k].upper);
+    for (std::size_t k = 0; k < 3; ++k)
+      now.v_W_m_s[static_cast<int>(k)] = between(random, velocity[k].lower, velocity[k].upper);
     Eigen::Vector3d force = Eigen::Vector3d::Zero();
     for (const EffectSpec& spec : model.effects) {
       if (spec.name == "motor_lag" || spec.name == "downwash") continue;
       force += AppliedEffect(spec, {model.kind, {model.kind}, model.path}).wrench(now).force_W_N;
     }
-    for (int k = 0; k < 3; ++k) {
-      ASSERT_GE(force[k], rest.force_N[k].lower - 1e-13);
-      ASSERT_LE(force[k], rest.force_N[k].upper + 1e-13);
+    for (std::size_t k = 0; k < 3; ++k) {
+      ASSERT_GE(force[static_cast<int>(k)], rest_N[k].lower - 1e-13);
+      ASSERT_LE(force[static_cast<int>(k)], rest_N[k].upper + 1e-13);
     }
   }
 }

@@ -29,7 +29,7 @@ std::optional<double> largest_error_m(const Tracking& input, const TrackingRepor
 double proved_amplitude_N(const Tracking& input, DisturbanceSource source, const InitialError& initial) {
   const auto is_proved = [&](double amplitude_N) {
     for (Disturbance& d : source.axis) d.amplitude_N = amplitude_N;
-    return saturation(input, source, initial).is_proved();
+    return thrust_demand(input, source, initial).is_proved();
   };
   double low_N = 0, high_N = input.thrust_range_N().upper;
   if (!std::isfinite(high_N) || !is_proved(0)) return 0;

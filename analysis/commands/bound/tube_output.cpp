@@ -24,75 +24,6 @@ constexpr int kCurvePoints = 200;
 /// Far above the lag of any motor; larger numbers are probably milliseconds.
 constexpr double kLongestLag_s = 1;
 
-ForceConstants worst_of(const TubeRow& row) {
-  ForceConstants worst;
-  for (const ForceConstants& c : row.constants) {
-    worst.together = std::max(worst.together, c.together);
-    worst.position = std::max(worst.position, c.position);
-    worst.velocity = std::max(worst.velocity, c.velocity);
-    worst.own = std::max(worst.own, c.own);
-  }
-  return worst;
-}
-
-void describe_verdict(files::Record& record, const LeastTube& tube) {
-  using Radii = std::optional<std::array<double, 3>>;
-  record.field("verdict", tube.proved ? "proved" : "inconclusive", "");
-  record.may("why", tube.proved ? std::nullopt : std::optional(tube.why), "Why nothing was proved.");
-  record.field("radius_m", tube.proved ? tube.radius_m() : INFINITY, "Of all axes; null: not proved.", "m",
-               "upper bound");
-  record.field("radius_xyz_m",
-               tube.proved ? Radii({tube.radius_m(0), tube.radius_m(1), tube.radius_m(2)}) : Radii(),
-               "Null: not proved.", "m", "upper bound");
-  record.field("loop_gain", tube.loop_gain,
-               "Factor by which an error adds to its own bound; below 1 proves.");
-}
-
-void describe_tube_row(files::Record& record, const TubeRow& row) {
-  describe_verdict(record, row.tube);
-  const ForceConstants worst = worst_of(row);
-  record.object("lipschitz", "Largest of all vehicles; null: not part of this bound.",
-                [&worst](files::Record& r) {
-                  r.field("all_N", worst.together, "Per (m, m/s).", "N", "upper bound");
-                  r.field("position_N_m", worst.position, "", "N/m", "upper bound");
-                  r.field("velocity_N_s_m", worst.velocity, "", "N s/m", "upper bound");
-                  r.field("own_N", worst.own, "", "N", "upper bound");
-                });
-}
-
-void describe_force_error(files::Record& record, const ForceErrorBounds& b) {
-  const auto bound = [&record](const char* name, double x_m) {
-    record.field(name, x_m, "", "m", "upper bound");
-  };
-  record.field("vehicle", b.vehicle + 1, "From 1.");
-  record.constant("axis", "z", "");
-  record.object("force_error", "f_hat - f_a within the tube.", [&b](files::Record& r) {
-    r.field("amplitude_N", b.amplitude_N, "", "N", "upper bound");
-    r.field("rate_N_s", b.rate_N_s, "", "N/s", "upper bound");
-    r.field("variation_N", b.variation_N, "", "N", "upper bound");
-    r.field("impulse_N_s", b.impulse_N_s, "", "N s", "upper bound");
-  });
-  bound("rate", b.by_rate_m);
-  bound("amplitude", b.by_amplitude_m);
-  bound("edges", b.by_edges_m);
-  bound("impulse", b.by_impulse_m);
-  bound("slices", b.by_slices_m);
-  bound("lag", b.lag_m);
-  bound("minimum", b.least_m());
-}
-
-std::string radius_text(const LeastTube& tube) {
-  return tube.proved ? fmt::format("{:.4g} m", tube.radius_m()) : std::string("none");
-}
-
-/// The combined tube, with the verdict of all results together.
-LeastTube combined(const LocalTube& tube) {
-  LeastTube all = tube.tube;
-  all.proved = tube.proved;
-  all.why = tube.why;
-  return all;
-}
-
 }  // namespace
 
 void declare_tube(CLI::App& app, TubeArguments& arguments) {
@@ -204,8 +135,8 @@ LocalTube load_local_tube(const TubeArguments& arguments, const DisturbanceArgum
   }
   if (measured != nullptr) options.residual = &measured->envelope;
   options.motor_lag_s = lag_interval(arguments, truth, tracking);
-  options.progress = [&progress](int done, int total, const std::string& what) {
-    progress.show(done, total, what);
+  options.enclosure.progress = [&progress](int done, int total) {
+    progress.show(done, total, "tube slice by slice");
   };
   return local_tube(tracking, truth, network, *task, arguments.vehicles, options);
 }
@@ -272,25 +203,24 @@ struct Curve {
 /// The slices of a proved tube, joined to about kCurvePoints.
 std::vector<Curve> curves_of(const LocalTube& tube) {
   std::vector<Curve> curves;
-  const std::size_t count = tube.proved ? tube.slices.size() : 0;
+  const std::size_t count = tube.proved ? tube.sliced.slices.size() : 0;
   const std::size_t every = std::max<std::size_t>(1, (count + kCurvePoints - 1) / kCurvePoints);
   for (std::size_t first = 0; first < count; first += every) {
     const std::size_t last = std::min(count, first + every);
     Curve curve{static_cast<double>(last) * tube.slice_s, {}};
-    for (std::size_t i = 0; i < tube.slices.front().size(); ++i) {
-      auto& range = curve.error_xyz_m.emplace_back(tube.slices[first][i].position_m);
+    for (std::size_t i = 0; i < tube.whole.size(); ++i) {
+      auto& range = curve.error_xyz_m.emplace_back(tube.sliced.slices[first][i].position_m);
       for (std::size_t n = first + 1; n < last; ++n)
-        for (std::size_t k = 0; k < 3; ++k) range[k] = hull(range[k], tube.slices[n][i].position_m[k]);
+        for (std::size_t k = 0; k < 3; ++k) range[k] = hull(range[k], tube.sliced.slices[n][i].position_m[k]);
     }
     curves.push_back(std::move(curve));
   }
   return curves;
 }
 
-struct VehicleRadii {
-  std::size_t vehicle = 0;
-  std::array<double, 3> position_m{}, velocity_m_s{};
-};
+std::array<double, 3> sizes(const std::array<Interval, 3>& ranges) {
+  return {ranges[0].mag(), ranges[1].mag(), ranges[2].mag()};
+}
 
 std::array<double, 3> axes_of_estimates(const double (&values)[3]) {
   return {values[0], values[1], values[2]};
@@ -313,34 +243,33 @@ void describe(files::Record& record, const TaskTube& result) {
   record.field("position_error_m", axes_of_estimates(tube.estimates.position_m), "Likewise.", "m");
   record.field("motor_lag_s", tube.motor_lag_s, "Least and largest lag of the motors for which it holds.",
                "s");
-  describe_verdict(record, combined(tube));
+  record.field("verdict", verdict_name(tube), "");
+  record.may("why", tube.proved ? std::nullopt : std::optional(tube.why), "Why nothing was proved.");
+  record.field("radius_m", tube.proved ? largest_position_m(tube.whole) : INFINITY,
+               "Of all axes; null: not proved.", "m", "upper bound");
+  std::optional<std::array<double, 3>> of_axes_m;
+  if (tube.proved)
+    of_axes_m = {largest_position_m(tube.whole, 0), largest_position_m(tube.whole, 1),
+                 largest_position_m(tube.whole, 2)};
+  record.field("radius_xyz_m", of_axes_m, "Null: not proved.", "m", "upper bound");
   record.field("interrupted", tube.cancelled, "");
-  std::vector<VehicleRadii> radii;
-  for (std::size_t i = 0; tube.proved && i < tube.tube.radii.position_m.size(); ++i)
-    radii.push_back({i + 1, tube.tube.radii.position_m[i], tube.tube.radii.velocity_m_s[i]});
-  record.list("radii", radii, "Largest errors of every vehicle.",
-              [](files::Record& r, const VehicleRadii& one) {
-                r.field("vehicle", one.vehicle, "From 1.");
-                r.field("position_m", one.position_m, "", "m", "upper bound");
-                r.field("velocity_m_s", one.velocity_m_s, "", "m/s", "upper bound");
+  std::vector<std::size_t> vehicles;
+  for (std::size_t i = 0; tube.proved && i < tube.whole.size(); ++i) vehicles.push_back(i);
+  record.list("radii", vehicles, "Largest errors of every vehicle.",
+              [&tube](files::Record& r, std::size_t i) {
+                const Deviation one = i < tube.whole.size() ? tube.whole[i] : Deviation();
+                const double force_N = i < tube.whole.size() ? tube.largest_force_error_N(i) : 0;
+                r.field("vehicle", i + 1, "From 1.");
+                r.field("position_m", sizes(one.position_m), "", "m", "upper bound");
+                r.field("velocity_m_s", sizes(one.velocity_m_s), "", "m/s", "upper bound");
+                r.field("force_error_N", force_N, "|f_hat - f_a| along z.", "N", "upper bound");
               });
-  for (const char* const name : {"product", "global", "local"}) {
-    const auto row = std::find_if(tube.rows.begin(), tube.rows.end(),
-                                  [name](const TubeRow& one) { return one.name == name; });
-    const bool is_present = row != tube.rows.end();
-    record.may_object(is_present, name, "What a Lipschitz bound of the network alone would prove.",
-                      [&](files::Record& r) { describe_tube_row(r, is_present ? *row : TubeRow()); });
-  }
-  record.list("bounds", tube.bounds, "Of the error along z, by class of the force error; null: not bounded.",
-              describe_force_error);
   record.field("assumptions", tube.assumptions, "");
   const std::vector<Curve> curves = curves_of(tube);
   record.list("slices", curves, "Ranges of the errors over time.", [](files::Record& r, const Curve& curve) {
     r.field("until_s", curve.until_s, "", "s");
     r.field("error_xyz_m", curve.error_xyz_m, "Per vehicle and axis.", "m", "enclosure");
   });
-  record.object("one_radius", "With one radius for the whole flight.",
-                [&tube](files::Record& r) { describe_verdict(r, tube.one_radius); });
   record.may_object(result.measured.has_value(), "measured",
                     "The residual of flights that the tube contains.", [&](files::Record& r) {
                       describe_measured(r, result.measured ? *result.measured : MeasuredTruth(), tube);
@@ -359,33 +288,13 @@ void print(const TaskTube& result) {
              counted(static_cast<std::size_t>(result.vehicles), "vehicle"), tube.duration_s, loop_name(tube),
              verdict_name(tube));
   if (tube.proved) {
-    fmt::print("  errors stay below x {:.4g} m, y {:.4g} m, z {:.4g} m\n", tube.tube.radius_m(0),
-               tube.tube.radius_m(1), tube.tube.radius_m(2));
-    fmt::print("  with one radius for the whole flight: {} (loop gain {:.3g})\n",
-               radius_text(tube.one_radius), tube.one_radius.loop_gain);
-    const auto number = [](double x) {
-      return std::isfinite(x) ? fmt::format("{:.4g}", x) : std::string("-");
-    };
-    for (const ForceErrorBounds& b : tube.bounds) {
-      fmt::print(
-          "  vehicle {}: |f_hat - f_a| <= {} N, rate {} N/s, int {} N s; error by rate {}, amplitude {}, "
-          "edges {}, impulse {}, slices {} m\n",
-          b.vehicle + 1, number(b.amplitude_N), number(b.rate_N_s), number(b.impulse_N_s),
-          number(b.by_rate_m), number(b.by_amplitude_m), number(b.by_edges_m), number(b.by_impulse_m),
-          number(b.by_slices_m));
-    }
+    fmt::print("  errors stay below x {:.4g} m, y {:.4g} m, z {:.4g} m\n", largest_position_m(tube.whole, 0),
+               largest_position_m(tube.whole, 1), largest_position_m(tube.whole, 2));
+    for (std::size_t i = 0; i < tube.whole.size(); ++i)
+      fmt::print("  vehicle {}: |f_hat - f_a| <= {:.4g} N\n", i + 1, tube.largest_force_error_N(i));
     if (result.measured) print_measured(*result.measured, tube);
   } else {
     fmt::print("  {}\n", tube.why);
-  }
-  for (const TubeRow& row : tube.rows) {
-    const ForceConstants worst = worst_of(row);
-    const std::string constants =
-        std::isfinite(worst.position)
-            ? fmt::format("{:.4g} N/m, {:.4g} N s/m", worst.position, worst.velocity)
-            : fmt::format("{:.4g} N per (m, m/s)", worst.together);
-    fmt::print("  {:<8} Lipschitz bound alone, {}: radius {} (loop gain {:.3g})\n", row.name, constants,
-               radius_text(row.tube), row.tube.loop_gain);
   }
   for (const stability::Assumption& a : tube.assumptions)
     fmt::print("  {:<8} {}{}\n", a.status, a.name, a.note.empty() ? "" : " (" + a.note + ")");
@@ -398,15 +307,6 @@ void add_plot(Report& report, const TaskTube& result) {
                                counted(static_cast<std::size_t>(result.vehicles), "vehicle"), tube.duration_s,
                                loop_name(tube), verdict_name(tube)));
   if (!tube.proved) report.paragraph(tube.why + ".");
-  std::vector<std::vector<std::string>> rows;
-  rows.push_back({"difference of both forces, slice by slice", radius_text(combined(tube)), "any"});
-  rows.push_back({"difference of both forces, one radius", radius_text(tube.one_radius),
-                  fmt::format("{:.3g}", tube.one_radius.loop_gain)});
-  for (const TubeRow& row : tube.rows) {
-    rows.push_back({row.name + " Lipschitz bound alone", radius_text(row.tube),
-                    fmt::format("{:.3g}", row.tube.loop_gain)});
-  }
-  report.table({"force error from", "radius", "loop gain"}, rows);
   if (!tube.proved) return;
   std::string data = "# until_s, then least and largest e_z per vehicle, m\n";
   for (const Curve& curve : curves_of(tube)) {
@@ -416,7 +316,7 @@ void add_plot(Report& report, const TaskTube& result) {
     data += "\n";
   }
   std::string script = "set xlabel 'time [s]'\nset ylabel 'height error [m]'\nplot ";
-  for (std::size_t i = 0; i < tube.slices.front().size(); ++i) {
+  for (std::size_t i = 0; i < tube.whole.size(); ++i) {
     script += fmt::format(
         "{}'local_tube.dat' using 1:{} with fsteps linetype {} title 'cf{}', '' using 1:{} with "
         "fsteps linetype {} notitle",
@@ -425,7 +325,7 @@ void add_plot(Report& report, const TaskTube& result) {
   report.figure("local_tube", data, script + "\n",
                 fmt::format("Proved range of the height error of each vehicle at each time, within {:.4g} m "
                             "over the whole flight.",
-                            tube.tube.radius_m(2)));
+                            largest_position_m(tube.whole, 2)));
 }
 
 }  // namespace swarmcert::analysis

@@ -28,19 +28,11 @@ const std::string& unit_of(const std::string& quantity) { return quantity_of(qua
 const std::string& meaning(const std::string& quantity) { return quantity_of(quantity).meaning; }
 int better(const std::string& quantity) { return quantity_of(quantity).better; }
 
-stability::Grid axes_of(const MergedSweep& sweep) {
-  stability::Grid grid;
-  for (std::size_t i = 0; i < sweep.axis_names.size(); ++i) {
-    grid.axes.push_back({sweep.axis_names[i], sweep.axis_values[i]});
-  }
-  return grid;
-}
-
 std::string where(const MergedSweep& sweep, const Cell& cell) {
-  const std::vector<double> at = axes_of(sweep).at(cell.index);
+  const std::vector<double> at = sweep.grid.at(cell.index);
   std::string text;
   for (std::size_t i = 0; i < at.size(); ++i)
-    text += fmt::format("{}{} {:.6g}", i > 0 ? ", " : "", sweep.axis_names[i], at[i]);
+    text += fmt::format("{}{} {:.6g}", i > 0 ? ", " : "", sweep.grid.axes[i].name, at[i]);
   return text;
 }
 
@@ -60,8 +52,8 @@ std::map<std::string, int> reasons(const MergedSweep& sweep) {
 /// Axes that have more than one value.
 std::vector<std::size_t> varying(const MergedSweep& sweep) {
   std::vector<std::size_t> result;
-  for (std::size_t i = 0; i < sweep.axis_values.size(); ++i) {
-    if (sweep.axis_values[i].size() > 1) result.push_back(i);
+  for (std::size_t i = 0; i < sweep.grid.axes.size(); ++i) {
+    if (sweep.grid.axes[i].values.size() > 1) result.push_back(i);
   }
   return result;
 }
@@ -98,21 +90,21 @@ Plane plane_of(const MergedSweep& sweep, std::size_t quantity) {
   Plane plane;
   plane.axes = varying(sweep);
   if (plane.axes.size() > 2) plane.axes.resize(2);
-  const stability::Grid grid = axes_of(sweep);
-  const int sign = better(sweep.compute[quantity]);
+  const stability::Grid& grid = sweep.grid;
+  const int sign = better(sweep.grid.compute[quantity]);
   std::vector<std::vector<double>> edges;
-  for (const std::size_t axis : plane.axes) edges.push_back(edges_of(sweep.axis_values[axis]));
+  for (const std::size_t axis : plane.axes) edges.push_back(edges_of(sweep.grid.axes[axis].values));
   for (const Cell& cell : sweep.cells) {
     const std::vector<double> at = grid.at(cell.index);
     bool is_shown = cell.infeasible.empty() && std::isfinite(cell.values[quantity]);
     for (std::size_t i = 0; i < at.size(); ++i) {
       const bool is_of_plane = std::count(plane.axes.begin(), plane.axes.end(), i) > 0;
-      is_shown = is_shown && (is_of_plane || at[i] == sweep.axis_values[i].front());
+      is_shown = is_shown && (is_of_plane || at[i] == sweep.grid.axes[i].values.front());
     }
     if (!is_shown) continue;
     std::string place, box;
     for (std::size_t k = 0; k < plane.axes.size(); ++k) {
-      const std::vector<double>& values = sweep.axis_values[plane.axes[k]];
+      const std::vector<double>& values = sweep.grid.axes[plane.axes[k]].values;
       const double value = at[plane.axes[k]];
       const auto index =
           static_cast<std::size_t>(std::find(values.begin(), values.end(), value) - values.begin());
@@ -146,10 +138,10 @@ std::string heat_map(const MergedSweep& sweep, const Plane& plane, std::size_t q
   std::string script =
       "set object 1 rectangle from graph 0,0 to graph 1,1 behind fillcolor rgb '#dddddd' "
       "fillstyle solid noborder\nset style fill solid noborder\nunset grid\nset tics out\n";
-  const std::vector<double> best_at = axes_of(sweep).at(plane.best->index);
+  const std::vector<double> best_at = sweep.grid.at(plane.best->index);
   std::string place;
   for (std::size_t k = 0; k < 2; ++k) {
-    const std::vector<double>& values = sweep.axis_values[plane.axes[k]];
+    const std::vector<double>& values = sweep.grid.axes[plane.axes[k]].values;
     const std::vector<double> edges = edges_of(values);
     const double at = best_at[plane.axes[k]];
     script += fmt::format("set {}range [{:.10g}:{:.10g}]\n", names[k], edges.front(), edges.back());
@@ -166,26 +158,26 @@ void add_plane(Report& report, const MergedSweep& sweep, std::size_t quantity) {
   if (varying(sweep).empty()) return;
   const Plane plane = plane_of(sweep, quantity);
   if (plane.best == nullptr) return;
-  const std::string& name = sweep.compute[quantity];
+  const std::string& name = sweep.grid.compute[quantity];
   const std::string file = "sweep_" + name;
   const std::string label = name + " [" + unit_of(name) + "]";
   const bool is_map = plane.axes.size() > 1;
   std::string script = "set key off\nset title " + plot_string(meaning(name)) + "\nset xlabel " +
-                       plot_string(sweep.axis_names[plane.axes[0]]) + "\nset " + (is_map ? "cb" : "y") +
+                       plot_string(sweep.grid.axes[plane.axes[0]].name) + "\nset " + (is_map ? "cb" : "y") +
                        "label " + plot_string(label) + "\n";
-  if (is_geometric(sweep.axis_values[plane.axes[0]])) script += "set logscale x\n";
+  if (is_geometric(sweep.grid.axes[plane.axes[0]].values)) script += "set logscale x\n";
   if (is_map) {
-    if (is_geometric(sweep.axis_values[plane.axes[1]])) script += "set logscale y\n";
-    script += "set ylabel " + plot_string(sweep.axis_names[plane.axes[1]]) +
+    if (is_geometric(sweep.grid.axes[plane.axes[1]].values)) script += "set logscale y\n";
+    script += "set ylabel " + plot_string(sweep.grid.axes[plane.axes[1]].name) +
               "\nif (exists('narrow')) { set lmargin at screen 0.22 }\n" +
               heat_map(sweep, plane, quantity, file);
   } else {
     script += "plot '" + file + ".dat' using 1:4 with lines linewidth 2\n";
   }
   std::string best;
-  const std::vector<double> at = axes_of(sweep).at(plane.best->index);
+  const std::vector<double> at = sweep.grid.at(plane.best->index);
   for (std::size_t axis = 0; axis < at.size(); ++axis)
-    best += fmt::format("{} {} {:.4g}", axis > 0 ? "," : "", sweep.axis_names[axis], at[axis]);
+    best += fmt::format("{} {} {:.4g}", axis > 0 ? "," : "", sweep.grid.axes[axis].name, at[axis]);
   report.figure(file, plane.data, script,
                 fmt::format("{}. The best cell has {:.3g} {} at{}.{}{}", label, plane.best->values[quantity],
                             unit_of(name), best,
@@ -196,17 +188,19 @@ void add_plane(Report& report, const MergedSweep& sweep, std::size_t quantity) {
 void add_front(Report& report, const MergedSweep& sweep) {
   if (sweep.front.empty()) return;
   report.heading("Pareto front");
-  std::vector<std::string> header = sweep.axis_names;
-  for (const std::string& name : sweep.pareto) header.push_back(name + " [" + unit_of(name) + "]");
+  std::vector<std::string> header;
+  for (const stability::GridAxis& axis : sweep.grid.axes) header.push_back(axis.name);
+  for (const std::string& name : sweep.grid.pareto) header.push_back(name + " [" + unit_of(name) + "]");
   std::vector<std::vector<std::string>> rows;
   std::string data;
-  const stability::Grid grid = axes_of(sweep);
+  const stability::Grid& grid = sweep.grid;
   for (const long index : sweep.front) {
     const Cell& cell = sweep.cells[static_cast<std::size_t>(index)];
     std::vector<std::string> row;
     for (const double value : grid.at(index)) row.push_back(fmt::format("{:.6g}", value));
-    for (const std::string& name : sweep.pareto) {
-      const auto column = std::find(sweep.compute.begin(), sweep.compute.end(), name) - sweep.compute.begin();
+    for (const std::string& name : sweep.grid.pareto) {
+      const auto column =
+          std::find(sweep.grid.compute.begin(), sweep.grid.compute.end(), name) - sweep.grid.compute.begin();
       const double value = cell.values[static_cast<std::size_t>(column)];
       row.push_back(fmt::format("{:.6g}", value));
       data += fmt::format("{:.10g} ", value);
@@ -214,12 +208,13 @@ void add_front(Report& report, const MergedSweep& sweep) {
     data += "\n";
     if (rows.size() < 200) rows.push_back(std::move(row));
   }
-  if (sweep.pareto.size() >= 2) {
-    report.figure("pareto", data,
-                  "set xlabel " + plot_string(sweep.pareto[0] + " [" + unit_of(sweep.pareto[0]) + "]") +
-                      "\nset ylabel " + plot_string(sweep.pareto[1] + " [" + unit_of(sweep.pareto[1]) + "]") +
-                      "\nset key off\nplot 'pareto.dat' using 1:2 with points pointtype 7\n",
-                  "Cells that no other beats in every one of the listed quantities.");
+  if (sweep.grid.pareto.size() >= 2) {
+    report.figure(
+        "pareto", data,
+        "set xlabel " + plot_string(sweep.grid.pareto[0] + " [" + unit_of(sweep.grid.pareto[0]) + "]") +
+            "\nset ylabel " + plot_string(sweep.grid.pareto[1] + " [" + unit_of(sweep.grid.pareto[1]) + "]") +
+            "\nset key off\nplot 'pareto.dat' using 1:2 with points pointtype 7\n",
+        "Cells that no other beats in every one of the listed quantities.");
   }
   report.table(header, rows);
 }
@@ -231,26 +226,26 @@ void print_sweep(const MergedSweep& sweep) {
                                       [](const Cell& cell) { return cell.infeasible.empty(); });
   fmt::print("{}, {} feasible\n", counted(sweep.cells.size(), "cell"), feasible);
   for (const auto& [reason, count] : reasons(sweep)) fmt::print("  {:>7} infeasible: {}\n", count, reason);
-  for (std::size_t q = 0; q < sweep.compute.size(); ++q) {
+  for (std::size_t q = 0; q < sweep.grid.compute.size(); ++q) {
     const Cell* best = nullptr;
-    const int sign = better(sweep.compute[q]);
+    const int sign = better(sweep.grid.compute[q]);
     for (const Cell& cell : sweep.cells) {
       if (!cell.infeasible.empty() || !std::isfinite(cell.values[q])) continue;
       if (best == nullptr || sign * cell.values[q] > sign * best->values[q]) best = &cell;
     }
     if (best == nullptr) continue;
-    fmt::print("  best {:<21} {:.6g} {} at {}\n", sweep.compute[q], best->values[q],
-               unit_of(sweep.compute[q]), where(sweep, *best));
+    fmt::print("  best {:<21} {:.6g} {} at {}\n", sweep.grid.compute[q], best->values[q],
+               unit_of(sweep.grid.compute[q]), where(sweep, *best));
   }
   if (!sweep.front.empty()) fmt::print("  Pareto front: {}\n", counted(sweep.front.size(), "cell"));
 }
 
 std::string write_sweep_report(const MergedSweep& sweep, const std::string& folder, bool overwrite) {
-  Report report("Sweep of " + sweep.grid_path);
+  Report report("Sweep of " + sweep.grid.path);
   report.result(sweep_json(sweep));
   // The page is the same whether the cells come from one run or from merged shards.
-  report.made_by(shell_line({"swarmcert", "sweep", sweep.grid_path, "-o", "OUTPUT"}));
-  for (std::size_t q = 0; q < sweep.compute.size(); ++q) add_plane(report, sweep, q);
+  report.made_by(shell_line({"swarmcert", "sweep", sweep.grid.path, "-o", "OUTPUT"}));
+  for (std::size_t q = 0; q < sweep.grid.compute.size(); ++q) add_plane(report, sweep, q);
   add_front(report, sweep);
   const std::map<std::string, int> why = reasons(sweep);
   if (!why.empty()) {

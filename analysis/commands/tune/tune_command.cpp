@@ -140,7 +140,7 @@ std::function<stability::DisturbedLoop(const stability::SampledLoop&)> disturbed
     for (const auto channel : {stability::Channel::kForce, stability::Channel::kCommand})
       result.error_m = std::max(
           result.error_m, axis_bounds(changed, flown_gains(changed, axis, channel), source, {}).least());
-    result.thrust_margin_N = saturation(changed, source, {}).margin_N();
+    result.thrust_margin_N = thrust_demand(changed, source, {}).margin_N();
     return result;
   };
 }

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "nn/base/interval.h"
 #include "stability/bounds/enclosures/lag_range_cells.h"
@@ -15,8 +14,6 @@ namespace {
 using stability::AxisLoop;
 using stability::IntervalVector;
 using stability::KernelCells;
-
-constexpr double kUnknown = std::numeric_limits<double>::infinity();
 
 /// Relative tolerance for a slice to count as an integer number of periods.
 constexpr double kPeriodTolerance = 1e-12;
@@ -130,10 +127,7 @@ ErrorLoop error_loop(const AxisLoop& loop, Interval motor_lag_s, double period_s
   if (integrates == 1) result.h = kernels.h(0);
   result.h1 = kernels.h(integrates);
   result.h2 = kernels.h(integrates + 1);
-  if (period_s > 0) {
-    result.direct_rest = kernels.direct_rest(result.has_lag);
-    if (result.direct_rest) result.direct_rest_total = result.direct_rest->total();
-  }
+  if (period_s > 0) result.direct_rest = kernels.direct_rest(result.has_lag);
   if (integrates == 1) result.demand = kernels.demand();
   if (!result.has_lag) {
     if (period_s > 0) add_slopes(slice_s, std::nullopt, result);
@@ -144,21 +138,8 @@ ErrorLoop error_loop(const AxisLoop& loop, Interval motor_lag_s, double period_s
   result.g2 = kernels.g(integrates + 2);
   result.h3 = kernels.h(integrates + 2);
   if (period_s == 0) return result;
-  if (result.h3) result.h3_total = result.h3->total();
-  if (result.g2) result.g2_total = result.g2->total();
   const bool has_one_lag = loop.lags_s.empty() || motor_lag_s.upper == 0;
   add_slopes(slice_s, has_one_lag ? std::nullopt : kernels.h(integrates + 3), result);
-  return result;
-}
-
-std::vector<double> least(const std::optional<KernelCells>& by_size,
-                          const std::optional<KernelCells>& by_rate, const Signal& signal) {
-  std::vector<double> result(signal.size.size(), kUnknown);
-  if (by_size) result = convolved(*by_size, signal.size);
-  if (!by_rate || signal.rate.empty()) return result;
-  const std::vector<double> other = convolved(*by_rate, signal.rate);
-  const double jump = up(by_rate->peak * signal.at_start);
-  for (std::size_t k = 0; k < result.size(); ++k) result[k] = std::min(result[k], up(other[k] + jump));
   return result;
 }
 
@@ -218,13 +199,6 @@ void ErrorHistory::add(const ErrorHistory& other) {
   }
 }
 
-double ErrorHistory::largest_position_m() const {
-  return *std::max_element(position_m.begin(), position_m.end());
-}
-double ErrorHistory::largest_velocity_m_s() const {
-  return *std::max_element(velocity_m_s.begin(), velocity_m_s.end());
-}
-
 LagStart lag_start(const ErrorLoop& loop, double slice_s) {
   LagStart result;
   if (!loop.has_lag) return result;
@@ -273,14 +247,6 @@ EstimateAnswer estimate_answer(const ErrorLoop& loop, double velocity_m_s, doubl
   for (std::size_t n = 0; n < slices; ++n)
     result.acceleration_m_s2[n] = up(up(result.acceleration_m_s2[n] + integrated[n]) + at_once_m_s2);
   return result;
-}
-
-ErrorHistory respond(const ErrorLoop& loop, bool lagging, const Signal& signal) {
-  if (lagging && !loop.has_lag) {
-    return {std::vector<double>(signal.size.size(), 0.0), std::vector<double>(signal.size.size(), 0.0)};
-  }
-  if (lagging) return {least(loop.g1, loop.g, signal), least(loop.g2, loop.g1, signal)};
-  return {least(loop.h1, loop.h, signal), least(loop.h2, loop.h1, signal)};
 }
 
 }  // namespace swarmcert::analysis

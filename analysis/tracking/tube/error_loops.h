@@ -25,8 +25,6 @@ struct ErrorLoop {
   /// e'' is 1/m times w if there is a lag, or 1/m times f_a - f_hat + m x if there is none, minus the response of
   /// this kernel to the same signal, and with a lag plus h''' * (f_a - f_hat + m x).
   std::optional<stability::KernelCells> direct_rest;  ///< missing if the loop is continuous
-  /// KernelCells::total() of these kernels if the loop is sampled, else 0.
-  double direct_rest_total = 0, h3_total = 0, g2_total = 0;
   /// Whether each cell of a sampled loop spans an integer number of its periods. Then x = (t - t_k) y for
   /// t_k <= t < t_k + T, with y in [c - r, c + r], acts on a kernel k like T/2 y plus a remainder whose mean over each
   /// cell is 0. Integration by parts gives over a cell
@@ -64,15 +62,6 @@ ErrorLoops error_loops(const stability::FlownLoop& tracking, double slice_s, int
 struct ErrorHistory {
   std::vector<double> position_m, velocity_m_s;
   void add(const ErrorHistory& other);
-  double largest_position_m() const;
-  double largest_velocity_m_s() const;
-};
-
-/// Bounds of a signal per slice: sup |w|, and sup |w'| if its rate is bounded; w(0) may jump from 0.
-struct Signal {
-  std::vector<double> size;
-  std::vector<double> rate;  ///< empty: unknown
-  double at_start = 0;       ///< bound on |w(0)|; used with the rate
 };
 
 /// Errors of one axis per slice caused by one newton of excess thrust at t = 0, in m and m/s per N. A lag that starts
@@ -82,11 +71,6 @@ struct LagStart {
   std::vector<Interval> acceleration_m_s2;         ///< m/s^2 per N; empty if the loop is continuous
 };
 LagStart lag_start(const ErrorLoop& loop, double slice_s);
-
-/// Bounds the response from rest: |e| <= |h'| * size, or |h| * rate + sup|h| |w(0)|, whichever is smaller at each
-/// time; likewise |e'| with one more derivative.
-/// @param lagging use the kernels g instead of h.
-ErrorHistory respond(const ErrorLoop& loop, bool lagging, const Signal& signal);
 
 /// Bounds on the errors of the position and velocity passed to the control law and to the network of a vehicle, per
 /// axis, for any course over time. The neighbour states that a vehicle receives have the same error bounds.

@@ -117,24 +117,23 @@ std::vector<Offset> ForceDifference::offsets_at(const VectorXd& x) const {
 /// of the truth and once with its range; the smaller bound is used.
 ForceDifference::Form ForceDifference::difference(const Box& box, const WakeForm& truth, const VectorXd& row,
                                                   double constant, double sign) const {
-  const Interval rest_N = rest_.force_N[2];
   const Interval wake_N = truth.wake.value_N;
-  const double rest_least = sign > 0 ? -rest_N.lower : rest_N.upper;
+  const double rest_least = sign > 0 ? -rest_N_.lower : rest_N_.upper;
   Form flat{row, constant + (sign > 0 ? -wake_N.lower : wake_N.upper) + rest_least};
-  flat.constant += kRounding * (std::abs(constant) + wake_N.mag() + rest_N.mag());
+  flat.constant += kRounding * (std::abs(constant) + wake_N.mag() + rest_N_.mag());
   if (!truth.wake.has_gradient) return flat;
   const double shift = truth.slope.dot(truth.centre);
   const double slack = truth.spread_N + kRounding * truth.size_N;
   Form sloped{row - sign * truth.slope, constant +
                                             (sign > 0 ? -truth.at_centre_N.lower : truth.at_centre_N.upper) +
                                             sign * shift + slack + rest_least};
-  sloped.constant += kRounding * (std::abs(constant) + truth.size_N + rest_N.mag());
+  sloped.constant += kRounding * (std::abs(constant) + truth.size_N + rest_N_.mag());
   return sloped.largest(box) < flat.largest(box) ? sloped : flat;
 }
 
 /// |f_hat - f_a| with both forces evaluated at x: an estimate.
 double ForceDifference::roughly(const VectorXd& x) const {
-  const Interval f = scene_->truth().wake(offsets_at(x)).value_N + rest_.force_N[2];
+  const Interval f = scene_->truth().wake(offsets_at(x)).value_N + rest_N_;
   return std::abs(scene_->learned().roughly(x) - (f.lower + f.upper) / 2);
 }
 
@@ -169,11 +168,9 @@ ForceDifference::ForceDifference(const Scene& scene, const Stretch& stretch, con
     : scene_(&scene),
       stretch_(&stretch),
       all_(scene.seen_states(stretch, largest)),
-      rest_(scene.rest(stretch, largest, 0)) {
+      rest_N_(scene.without_wakes_N(stretch, largest)[2]) {
   parts_.push_back(std::make_shared<const Part>(part(box_of(all_), nullptr)));
 }
-
-double ForceDifference::bound_N() const { return parts_.front()->bound; }
 
 void ForceDifference::refine(int boxes, double tolerance_N, const std::atomic<bool>* cancelled) {
   double found = parts_.front()->found;

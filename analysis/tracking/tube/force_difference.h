@@ -20,7 +20,6 @@ class ForceDifference {
   /// @param largest deviations for which the bound is prepared.
   ForceDifference(const Scene& scene, const Stretch& stretch, const Deviations& largest);
 
-  double bound_N() const;  ///< bound on |f_hat - f_a| at the present refinement
   /// Halves the worst part until there are `boxes` parts, or the bound is within `tolerance_N` of an attained value.
   /// Call at most once.
   void refine(int boxes, double tolerance_N, const std::atomic<bool>* cancelled);
@@ -40,8 +39,8 @@ class ForceDifference {
 
   const Scene* scene_;
   const Stretch* stretch_;
-  std::vector<Interval> all_;  ///< every state of the stretch
-  TruthForce::Rest rest_;
+  std::vector<Interval> all_;                       ///< every state of the stretch
+  Interval rest_N_;                                 ///< the true force along z without wakes
   std::vector<std::shared_ptr<const Part>> parts_;  ///< a heap, worst part first
 };
 

@@ -5,54 +5,12 @@
 #include <limits>
 
 namespace swarmcert::analysis {
-namespace {
-
-/// |e''| <= from_signals + per_N |m x|.
-struct AccelerationBound {
-  Interval from_signals_m_s2, per_N;
-};
-
-AccelerationBound acceleration_bound(const ErrorLoop& loop, const LoopHistory& history,
-                                     double planned_at_start_m_s2, double excess_N) {
-  const Interval direct = Interval(1) / loop.mass_kg;
-  const Interval whole = direct + loop.direct_rest_total;
-  if (!loop.has_lag) return {whole * history.force_N + history.of_estimates_m_s2, whole};
-  const Interval mass(loop.mass_kg);
-  const Interval per_N(loop.h3_total);
-  const Interval by_size = whole * mass * history.planned_m_s2;
-  const Interval by_jerk =
-      mass * (Interval(loop.g2_total) * history.jerk_m_s3 + Interval(loop.g2->peak) * planned_at_start_m_s2);
-  return {per_N * history.force_N + history.of_estimates_m_s2 + std::min(by_size.upper, by_jerk.upper) +
-              whole * history.truth_N + loop.lags_s * loop.h3->peak * excess_N,
-          per_N};
-}
-
-}  // namespace
-
 void LoopHistory::add(const LoopHistory& later) {
   for (double LoopHistory::*const entry :
-       {&LoopHistory::position_m, &LoopHistory::velocity_m_s, &LoopHistory::force_N, &LoopHistory::truth_N,
-        &LoopHistory::planned_m_s2, &LoopHistory::jerk_m_s3, &LoopHistory::time_s,
-        &LoopHistory::of_estimates_m_s2}) {
+       {&LoopHistory::position_m, &LoopHistory::velocity_m_s, &LoopHistory::time_s}) {
     // Keeps NaN, since it means that no bound is known.
     if (!std::isnan(this->*entry) && !(later.*entry <= this->*entry)) this->*entry = later.*entry;
   }
-}
-
-double hold_error_N(const ErrorLoop& loop, const LoopHistory& history, double planned_at_start_m_s2,
-                    double excess_N) {
-  if (loop.period_s == 0) return 0;
-  const Interval T(loop.period_s);
-  const AccelerationBound acceleration = acceleration_bound(loop, history, planned_at_start_m_s2, excess_N);
-  const Interval known =
-      T * (Interval(loop.Kp) * history.velocity_m_s + history.jerk_m_s3 +
-           Interval(loop.Ki) * (history.position_m + T * history.velocity_m_s) / Interval(2));
-  const Interval per_acceleration = T * loop.Kd + Interval(loop.Ki) * T * T * history.time_s / Interval(12);
-  const Interval left = Interval(1) - per_acceleration * acceleration.per_N * loop.mass_kg;
-  if (!(left.lower > 0)) return std::numeric_limits<double>::infinity();
-  const Interval bound = Interval(loop.mass_kg) *
-                         (known + per_acceleration * acceleration.from_signals_m_s2) / Interval(left.lower);
-  return std::isnan(bound.upper) ? std::numeric_limits<double>::infinity() : bound.upper;
 }
 
 HeldAnswer hold_error(const ErrorLoop& loop, const HeldSlice& slice) {

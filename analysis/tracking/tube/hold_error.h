@@ -8,31 +8,10 @@ namespace swarmcert::analysis {
 /// One axis up to some time: suprema over all earlier times.
 struct LoopHistory {
   double position_m = 0, velocity_m_s = 0;  ///< |e|, |e'|
-  double force_N = 0;  ///< |f_hat - f_a| along z, |f_a| along x and y: the input of the kernels h
-  double truth_N = 0;  ///< |f_a|
-  double planned_m_s2 = 0, jerk_m_s3 = 0;  ///< |p_d''|, |p_d'''|
   double time_s = 0;
-  double of_estimates_m_s2 = 0;  ///< contribution of estimation errors to |e''|
 
   void add(const LoopHistory& later);  ///< entrywise maximum
 };
-
-/// Bounds m |x(t)|, N, of the sampled loop of error_loops.h, where x is the difference between the command held at t
-/// and the command of the continuous law at t. Returns 0 if the loop is continuous, and infinity if no bound is known.
-///
-/// Let the command be computed at t_k = k T, k = 0, 1, .., and held for t_k <= t < t_k + T:
-///   c_k = Kp e(t_k) + Kd e'(t_k) + Ki T sum_{j <= k} e(t_j),   x(t) = c(t) - c_k + p_d''(t_k) - p_d''(t),
-/// with c the continuous law and Ki the effective integral gain. The first two terms of c differ by at most T sup|e'|
-/// and T sup|e''| times their gains. With e(0) = 0,
-///   T sum_{j <= k} e(t_j) - int_0^{t_k} e = T e(t_k)/2 + R,   |R| <= (T^2/12) t_k sup|e''|,
-/// the error of the trapezoidal rule; together with int_{t_k}^t e that is at most T/2 sup|e| + T^2/2 sup|e'| + |R|.
-/// So |x| <= a + b sup|e''| with known a and b. In turn the kernels of the loop give sup|e''| <= p + q sup|x| (both
-/// suprema up to t, and finite), so that for b q < 1
-///   sup|x| <= (a + b p)/(1 - b q).
-/// @param planned_at_start_m_s2 bound on |p_d''(0)|; p_d'' is continuous from then on.
-/// @param excess_N bound on |thrust - weight| of the rotors at t = 0 (LagStart); 0 without a lag.
-double hold_error_N(const ErrorLoop& loop, const LoopHistory& history, double planned_at_start_m_s2,
-                    double excess_N);
 
 /// Bounds on one axis over a slice and the period of the loop before it.
 struct HeldSlice {
@@ -56,12 +35,17 @@ struct HeldAnswer {
   double sawtooth_N_s = 0;
 };
 
-/// The same bound per slice and with its sign: since c(t) - c(t_k) = int_{t_k}^t (Kp e' + Kd e'') + the part of the
-/// integral,
+/// The command of the sampled loop of error_loops.h is computed at t_k = k T, k = 0, 1, .., and held for
+/// t_k <= t < t_k + T:
+///   c_k = Kp e(t_k) + Kd e'(t_k) + Ki T sum_{j <= k} e(t_j),   x(t) = c(t) - c_k + p_d''(t_k) - p_d''(t),
+/// with c the continuous law and Ki the effective integral gain. With e(0) = 0,
+///   T sum_{j <= k} e(t_j) - int_0^{t_k} e = T e(t_k)/2 + R,   |R| <= (T^2/12) t_k sup|e''|,
+/// the error of the trapezoidal rule; together with int_{t_k}^t e that is at most T/2 sup|e| + T^2/2 sup|e'| + |R|.
+/// Hence, since c(t) - c(t_k) = int_{t_k}^t (Kp e' + Kd e'') + the part of the integral,
 ///   x(t) lies in (t - t_k) Y + [-1, 1] Ki (T/2 sup|e| + (T^2/2) sup|e'| + |R|),
 ///   Y = Kp E' + Kd E'' - J,
 /// with E', E'' and J intervals of e', e'' and p_d''' over the slice and the period before it. The contribution of x to
-/// E'' in its own slice is solved for as above. All results are infinite if no bound is known.
+/// E'' in its own slice is solved for. All results are infinite if no bound is known.
 HeldAnswer hold_error(const ErrorLoop& loop, const HeldSlice& slice);
 
 /// Upper bound in m s on the excess of the firmware's sum T sum e(t_j) over the largest |int e|; 0 if the loop is

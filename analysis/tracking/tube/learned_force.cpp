@@ -87,26 +87,24 @@ LearnedForce::LearnedForce(const files::Network& network, const std::string& kin
     if (name != files::kGroundKind) kinds.push_back(name);
   const std::string phi = network.phi.count(kind) == 1 ? kind : kinds.front();
   const std::string rho = network.rho.count(kind) == 1 ? kind : network.rho.begin()->first;
-  neighbour_function_ = files::FunctionId::set(phi, rho);
   newton_per_unit_ = network.output_unit == "N" ? 1 : stability::kGramForce_N;
   const int inputs = network.phi.at(phi).inputs();
+  std::vector<int> components;  // of (dp, dv), that each input of phi represents
   for (int i = 0; i < inputs; ++i) {
-    components_.push_back(
-        network.input_order.empty()
-            ? i
-            : static_cast<int>(component(network.input_order[static_cast<std::size_t>(i)])));
+    components.push_back(network.input_order.empty()
+                             ? i
+                             : static_cast<int>(component(network.input_order[static_cast<std::size_t>(i)])));
   }
 
   // Orders the inputs as in the state: columns are moved or negated, which is exact.
   ReachNetwork one = lipschitz::reach_network(network.phi.at(phi));
   MatrixXd first = MatrixXd::Zero(one.front().weights.rows(), kPerNeighbour);
   for (int i = 0; i < inputs; ++i)
-    first.col(components_[static_cast<std::size_t>(i)]) += one.front().weights.col(i);
+    first.col(components[static_cast<std::size_t>(i)]) += one.front().weights.col(i);
   one.front().weights = std::move(first);
   std::vector<ReachNetwork> parts(static_cast<std::size_t>(neighbours), one);
   const auto ground = network.phi.find(files::kGroundKind);
   if (ground != network.phi.end()) {
-    ground_function_ = files::FunctionId::set(files::kGroundKind, rho);
     parts.push_back(lipschitz::reach_network(ground->second));
     parts.back().front().weights *= -1;  // its inputs are -z and -v
   }
@@ -123,7 +121,7 @@ LearnedForce::LearnedForce(const files::Network& network, const std::string& kin
   for (ReachLayer& layer : lipschitz::reach_network(network.rho.at(rho))) layers_.push_back(std::move(layer));
   const std::vector<files::FunctionId> parts_in_sum(static_cast<std::size_t>(neighbours),
                                                     files::FunctionId::phi(phi));
-  if (files::is_silent_among(network, neighbour_function_, parts_in_sum)) {
+  if (files::is_silent_among(network, files::FunctionId::set(phi, rho), parts_in_sum)) {
     layers_.back().weights.setZero();
     layers_.back().bias.setZero();
   }
@@ -133,7 +131,7 @@ LearnedForce::LearnedForce(const files::Network& network, const std::string& kin
   if (!network.clamp) return;
   for (int j = 0; j < neighbours; ++j) {
     for (int i = 0; i < inputs; ++i) {
-      const auto at = static_cast<std::size_t>(j * kPerNeighbour + components_[static_cast<std::size_t>(i)]);
+      const auto at = static_cast<std::size_t>(j * kPerNeighbour + components[static_cast<std::size_t>(i)]);
       clamp_.lower[at] = network.clamp->lower[static_cast<std::size_t>(i)];
       clamp_.upper[at] = network.clamp->upper[static_cast<std::size_t>(i)];
     }

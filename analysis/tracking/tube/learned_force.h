@@ -3,7 +3,6 @@
 
 #include <Eigen/Core>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -45,21 +44,12 @@ class LearnedForce {
   double roughly(const Eigen::VectorXd& state) const;
 
   int states() const { return static_cast<int>(layers_.front().weights.cols()); }
-  double newton_per_unit() const { return newton_per_unit_; }
-  /// The set functions of a neighbour and, if present, of the ground.
-  const files::FunctionId& neighbour_function() const { return neighbour_function_; }
-  const std::optional<files::FunctionId>& ground_function() const { return ground_function_; }
-  /// The component of (dp, dv) that each input of phi represents.
-  const std::vector<int>& input_components() const { return components_; }
 
  private:
   lipschitz::Box clamped(const lipschitz::Box& box) const;
 
   lipschitz::ReachNetwork layers_;
   lipschitz::Box clamp_;  ///< clamp on the whole state, infinite where nothing is clamped
-  std::vector<int> components_;
-  files::FunctionId neighbour_function_;
-  std::optional<files::FunctionId> ground_function_;
   double newton_per_unit_ = 1;
 };
 

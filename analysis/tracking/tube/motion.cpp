@@ -59,13 +59,6 @@ struct KeyedStretch {
   void add_neighbour(const SetpointRange& own, const SetpointRange& other) {
     for (int a = 0; a < 3; ++a) stretch.state.push_back(kept(other.p_W_m[a] - own.p_W_m[a]));
     for (int a = 0; a < 3; ++a) stretch.state.push_back(kept(other.v_W_m_s[a] - own.v_W_m_s[a]));
-    Interval squares;
-    for (int a = 0; a < 3; ++a) {
-      const Interval size = abs(other.a_W_m_s2[a] - own.a_W_m_s2[a]);
-      squares += size * size;
-    }
-    key.push_back(snapped({0, sqrt(squares).mag()}).upper);
-    stretch.relative_acceleration_m_s2.push_back(key.back());
   }
 };
 

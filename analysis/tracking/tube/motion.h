@@ -14,10 +14,9 @@ struct Stretch {
   int vehicle = 0;
   std::vector<Interval>
       state;  ///< layout of learned_force.h: offsets and relative velocities, own height and velocity
-  Interval acceleration_m_s2[3];                   ///< a_d per axis
-  Interval acceleration_now_m_s2[3];               ///< over the slices alone
-  Interval jerk_m_s3[3];                           ///< over the slices and the `held_s` before them
-  std::vector<double> relative_acceleration_m_s2;  ///< per neighbour, largest |a_j - a|
+  Interval acceleration_m_s2[3];      ///< a_d per axis
+  Interval acceleration_now_m_s2[3];  ///< over the slices alone
+  Interval jerk_m_s3[3];              ///< over the slices and the `held_s` before them
 };
 
 struct Motion {

@@ -14,41 +14,18 @@
 
 namespace swarmcert::analysis {
 
-/// Deviation of each vehicle from its setpoint per axis: bounds on |e| and |e'| of vehicle i.
-struct Radii {
-  std::vector<std::array<double, 3>> position_m, velocity_m_s;
-
-  static Radii none(int vehicles);
-  /// Whether every entry is at most that of `other`. False for NaN.
-  bool within(const Radii& other) const;
-  /// Whether every entry is below that of `other`. False for NaN.
-  bool below(const Radii& other) const;
-  Radii scaled(double factor, double more) const;  ///< factor x + more
-  double largest_position_m(int axis) const;
-  double largest_position_m() const;  ///< over all axes
-};
-
-Radii smaller(const Radii& a, const Radii& b);  ///< entrywise
-Radii larger(const Radii& a, const Radii& b);
-
 /// Deviation of one vehicle from its setpoint: intervals of e and e'.
 struct Deviation {
   std::array<Interval, 3> position_m, velocity_m_s;
 };
 using Deviations = std::vector<Deviation>;  ///< of every vehicle
 
-/// Returns the symmetric intervals of the given radii.
-Deviations all_within(const Radii& radii);
+/// Returns the largest |e| of all vehicles along one axis, or along any.
+double largest_position_m(const Deviations& deviations, int axis);
+double largest_position_m(const Deviations& deviations);
 
-/// The declared truth at the states of one stretch: f_a and its sensitivity.
-struct TruthSizes {
-  Interval force_N[3];
-  double rest_width_N = 0;           ///< along z, of all effects but wakes: largest change within the tube
-  std::vector<double> gradient_N_m;  ///< per neighbour, |d f_z / d p_j|; infinite where the field jumps
-};
-
-/// Enlarges `a` to contain `b`.
-void unite(TruthSizes& a, const TruthSizes& b);
+/// The forces along x, y and z.
+using Forces_N = std::array<Interval, 3>;
 
 /// The loops for motor lags in one part of the lag interval, and the effect of the rotors' initial thrust on z.
 struct LagPart {
@@ -100,44 +77,22 @@ class Scene {
   /// @param are_seen `states` are as the network receives them.
   std::vector<Offset> offsets(const std::vector<Interval>& states, const std::vector<Interval>& all,
                               bool are_seen = false) const;
-  /// Includes the residual, which may change at any rate.
-  TruthForce::Rest rest(const Stretch& stretch, const Deviations& deviations, double acceleration_m_s2) const;
-  TruthSizes truth_sizes(const Stretch& stretch, const Deviations& deviations) const;
-  std::vector<TruthSizes> truth_sizes(const Radii& radii) const;  ///< of every stretch
+  /// Returns the true force with the residual, at all states of the stretch.
+  Forces_N true_force_N(const Stretch& stretch, const Deviations& deviations) const;
+  /// The same without the neighbours' wakes.
+  Forces_N without_wakes_N(const Stretch& stretch, const Deviations& deviations) const;
 
   /// Thrust in excess of the weight at t = 0, N: rotors start anywhere between the weight and the force requested by
   /// the first prediction.
   Interval excess_at_start_N(int vehicle) const { return excess_N_[static_cast<std::size_t>(vehicle)]; }
 
-  /// Bounds of the errors of one vehicle from all causes other than f_hat - f_a along z: the lag of the feedforward
-  /// and of the truth, the rotors' initial thrust, estimation errors, and along x and y the truth itself.
-  std::array<ErrorHistory, 3> other_errors(int vehicle, const std::vector<TruthSizes>& truth) const;
-  /// Returns the contribution of one slice to the history of one axis.
-  LoopHistory in_slice(const Stretch& stretch, int slice, std::size_t axis, double force_N,
-                       const TruthSizes& truth, double position_m, double velocity_m_s) const;
-  /// hold_error_N() for an axis of a vehicle.
-  double hold_error_N(int vehicle, std::size_t axis, const LoopHistory& history) const;
-  /// The same per slice while all deviations are within `radii`.
-  /// @param force_N bound on |f_hat - f_a| along z, per stretch.
-  std::array<std::vector<double>, 3> hold_sizes_N(int vehicle, const Radii& radii,
-                                                  const std::vector<double>& force_N,
-                                                  const std::vector<TruthSizes>& truth) const;
-  /// Bounds of the errors caused by hold_sizes_N(); zero if the loop is continuous.
-  std::array<ErrorHistory, 3> hold_errors(int vehicle, const Radii& radii, const std::vector<double>& force_N,
-                                          const std::vector<TruthSizes>& truth) const;
-  /// Expands one number per stretch to one number per slice.
-  std::vector<double> by_slice(int vehicle, const std::vector<double>& by_stretch) const;
-  /// Bounds |e_z| while |f_hat - f_a| is at most `force_N` (per stretch), including `other`.
-  ErrorHistory errors_z(int vehicle, const std::vector<double>& force_N, const ErrorHistory& other) const;
+  /// Returns the history of an axis in one slice, from bounds on |e| and |e'| there.
+  LoopHistory in_slice(int slice, double position_m, double velocity_m_s) const;
 
-  /// Bounds on the deviation of a neighbour's relative position and velocity, in Euclidean norms.
-  double position_deviation_m(const Radii& radii, int vehicle, int neighbour) const;
-  double velocity_deviation_m_s(const Radii& radii, int vehicle, int neighbour) const;
   /// Returns the vehicle that is the j-th neighbour of `vehicle`.
   static int neighbour(int vehicle, int j) { return j < vehicle ? j : j + 1; }
 
  private:
-  ErrorHistory start_errors(int vehicle) const;
   void add_lag_parts(bool is_sampled);
 
   const stability::FlownLoop& tracking_;
@@ -152,7 +107,6 @@ class Scene {
   EstimateErrors estimates_;
   std::array<EstimateAnswer, 3> estimate_answers_;
   std::vector<Interval> excess_N_;  ///< per vehicle
-  LagStart lag_start_z_;
 };
 
 }  // namespace swarmcert::analysis

@@ -75,14 +75,6 @@ Deviations united(const ByPart& parts) {
   return result;
 }
 
-double largest_position_m(const ByPart& parts) {
-  double largest_m = 0;
-  for (const Deviations& part : parts)
-    for (const Deviation& one : part)
-      for (const Interval& x : one.position_m) largest_m = std::max(largest_m, x.mag());
-  return largest_m;
-}
-
 class Sweep {
  public:
   Sweep(const Scene& scene, const EnclosureOptions& options, double tolerance_N)
@@ -128,7 +120,7 @@ class Sweep {
       }
       const ByPart next = each(answered, answered, [](Interval x, Interval) { return wider(x); });
       tried = i == 0 ? next : hull_of(tried, next);
-      if (!(largest_position_m(tried) <= farthest_m)) {
+      if (!(largest_position_m(united(tried)) <= farthest_m)) {
         tube.why =
             fmt::format("at {:.3g} s errors could exceed {:g} m", n * scene_.motion().slice_s, farthest_m);
         return false;
@@ -145,7 +137,7 @@ class Sweep {
  private:
   struct Signal {
     Interval difference_N;  ///< f_hat - f_a
-    TruthSizes truth;
+    Forces_N truth_N;
     Interval lagging_N[3];
     LoopHistory met[3];  ///< up to the end of the slice
     HeldAnswer held[3];  ///< 0 where the loop is continuous
@@ -175,7 +167,7 @@ class Sweep {
       deviations[i] = seen[p][i];
       Signal& signal = signals[p][i];
       signal.difference_N = difference.over(deviations);
-      signal.truth = scene_.truth_sizes(stretch, deviations);
+      signal.truth_N = scene_.true_force_N(stretch, deviations);
       set_loop_signals(stretch, slice, axes_[p][i], deviations[i], recent[p][i], signal);
     }
   }
@@ -185,10 +177,9 @@ class Sweep {
                         const Deviation& seen, const Deviation& recent, Signal& signal) const {
     const Interval mass_kg(scene_.tracking().plant.mass_kg);
     for (std::size_t k = 0; k < 3; ++k) {
-      signal.lagging_N[k] = signal.truth.force_N[k] - mass_kg * stretch.acceleration_now_m_s2[k];
+      signal.lagging_N[k] = signal.truth_N[k] - mass_kg * stretch.acceleration_now_m_s2[k];
       signal.met[k] = axes[k].met;
-      signal.met[k].add(scene_.in_slice(stretch, slice, k, signal.difference_N.mag(), signal.truth,
-                                        seen.position_m[k].mag(), seen.velocity_m_s[k].mag()));
+      signal.met[k].add(scene_.in_slice(slice, seen.position_m[k].mag(), seen.velocity_m_s[k].mag()));
       if (scene_.loops().is_sampled()) {
         signal.held[k] = axes[k].held(known_force(signal, k), signal.lagging_N[k], recent.velocity_m_s[k],
                                       stretch.jerk_m_s3[k], signal.met[k], static_cast<std::size_t>(held_));
@@ -197,7 +188,7 @@ class Sweep {
   }
 
   static Interval known_force(const Signal& signal, std::size_t axis) {
-    return axis == 2 ? -signal.difference_N : signal.truth.force_N[axis];
+    return axis == 2 ? -signal.difference_N : signal.truth_N[axis];
   }
 
   Interval force(const Signal& signal, std::size_t axis) const {
@@ -230,11 +221,11 @@ class Sweep {
           hold_N[k] = std::max(hold_N[k], signal.held[k].hold_N.mag());
         }
         all.difference_N = hull(all.difference_N, signal.difference_N);
-        unite(all.truth, signal.truth);
+        for (std::size_t k = 0; k < 3; ++k) all.truth_N[k] = hull(all.truth_N[k], signal.truth_N[k]);
       }
       for (std::size_t k = 0; k < 3; ++k) tube.hold_N[i][k].push_back(hold_N[k]);
       tube.force_error_N[i].push_back(all.difference_N);
-      tube.truth[i].push_back(all.truth);
+      tube.truth[i].push_back(all.truth_N);
     }
     tube.slices.push_back(united(answered));
     past_.push_back(answered);
@@ -263,18 +254,7 @@ class Sweep {
 
 }  // namespace
 
-Radii SlicedTube::radii() const {
-  Radii result = Radii::none(static_cast<int>(force_error_N.size()));
-  for (const Deviations& slice : slices) {
-    for (std::size_t i = 0; i < slice.size(); ++i) {
-      for (std::size_t k = 0; k < 3; ++k) {
-        result.position_m[i][k] = std::max(result.position_m[i][k], slice[i].position_m[k].mag());
-        result.velocity_m_s[i][k] = std::max(result.velocity_m_s[i][k], slice[i].velocity_m_s[k].mag());
-      }
-    }
-  }
-  return result;
-}
+Deviations SlicedTube::whole() const { return united(slices); }
 
 SlicedTube sliced_tube(const Scene& scene, const EnclosureOptions& options, double tolerance_N,
                        double farthest_m) {
@@ -286,6 +266,7 @@ SlicedTube sliced_tube(const Scene& scene, const EnclosureOptions& options, doub
   for (int n = 0; n < scene.motion().slices; ++n) {
     if (!sweep.advance(tube, farthest_m)) {
       tube.cancelled = tube.why.empty();
+      if (tube.cancelled) tube.why = "interrupted";
       return tube;
     }
     if (options.progress) options.progress(n + 1, scene.motion().slices);

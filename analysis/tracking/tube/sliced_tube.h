@@ -2,24 +2,35 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <functional>
 #include <string>
 #include <vector>
 
-#include "analysis/tracking/tube/force_bound.h"
+#include "analysis/tracking/tube/force_difference.h"
 
 namespace swarmcert::analysis {
+
+struct EnclosureOptions {
+  int boxes = 32;  ///< maximum number of parts of each slice's set of states
+  /// Stops refining when the bound of |f_hat - f_a| is this close to an attained value, relative to the largest bound
+  /// at the set points.
+  double tolerance = 0.04;
+  int jobs = 0;
+  const std::atomic<bool>* cancelled = nullptr;
+  std::function<void(int done, int total)> progress;
+};
 
 struct SlicedTube {
   bool proved = false;
   std::vector<Deviations> slices;                    ///< e and e' of every vehicle per slice; valid if proved
   std::vector<std::vector<Interval>> force_error_N;  ///< [vehicle][slice]: f_hat - f_a along z
-  std::vector<std::vector<TruthSizes>> truth;        ///< likewise
+  std::vector<std::vector<Forces_N>> truth;          ///< likewise, f_a
   std::vector<std::array<std::vector<double>, 3>> hold_N;  ///< [vehicle][axis][slice]: sup |m x|
   std::string why;                                         ///< reason if not proved
   bool cancelled = false;
 
-  Radii radii() const;  ///< maximum over all slices
+  Deviations whole() const;  ///< over all slices
 };
 
 /// Finds one interval of e and e' for each vehicle, axis and slice in one pass through time.

@@ -204,44 +204,34 @@ TruthForce::Wake TruthForce::wake(const std::vector<Offset>& neighbours) const {
   return sum;
 }
 
-TruthForce::Rest TruthForce::rest(Interval height_m, const Interval velocity_m_s[3], double acceleration_m_s2,
-                                  double thrust_rate_N_s) const {
-  Rest result;
+std::array<Interval, 3> TruthForce::rest_N(Interval height_m,
+                                           const std::array<Interval, 3>& velocity_m_s) const {
+  std::array<Interval, 3> force_N;
   stability::MotionSet motion;
   Interval squares;
-  for (int k = 0; k < 3; ++k) squares += square(velocity_m_s[k]);
+  for (const Interval& v : velocity_m_s) squares += square(v);
   motion.speed_m_s = sqrt(squares).upper;
-  motion.acceleration_m_s2 = acceleration_m_s2;
-  motion.thrust_rate_N_s = thrust_rate_N_s;
   motion.least_height_m = std::max(0.0, height_m.lower);
   motion.largest_height_m = height_m.upper;
   motion.largest_thrust_N = largest_thrust_N_;
   for (const stability::EffectSpec& effect : others_) {
     if (effect.name == "constant_force" && effect.vehicle.empty()) {
       const char* const names[] = {"force_x_N", "force_y_N", "force_z_N"};
-      for (int k = 0; k < 3; ++k) result.force_N[k] += Interval(value_of(effect, names[k]));
+      for (std::size_t k = 0; k < 3; ++k) force_N[k] += Interval(value_of(effect, names[k]));
       continue;
     }
     if (effect.name == "drag_linear" && effect.vehicle.empty()) {
       const Interval drag(value_of(effect, "drag_N_s_m"));
-      for (int k = 0; k < 3; ++k) {
-        result.force_N[k] += -(drag * velocity_m_s[k]);
-        result.rate_N_s[k] = up(result.rate_N_s[k] + up(drag.upper * acceleration_m_s2));
-      }
+      for (std::size_t k = 0; k < 3; ++k) force_N[k] += -(drag * velocity_m_s[k]);
       continue;
     }
     const stability::EffectBounds bounds = truth_bounds(effect, model_, motion);
-    for (int k = 0; k < 3; ++k) {
+    for (std::size_t k = 0; k < 3; ++k) {
       const double most = up(bounds.amplitude_N[k] + bounds.bias_N[k]);
-      result.force_N[k] += Interval(-most, most);
-      if (std::isfinite(bounds.rate_N_s[k])) {
-        result.rate_N_s[k] = up(result.rate_N_s[k] + bounds.rate_N_s[k]);
-      } else {
-        result.abrupt_N[k] = up(result.abrupt_N[k] + most);
-      }
+      force_N[k] += Interval(-most, most);
     }
   }
-  return result;
+  return force_N;
 }
 
 }  // namespace swarmcert::analysis

@@ -37,15 +37,8 @@ class TruthForce {
   };
   Wake wake(const std::vector<Offset>& neighbours) const;
 
-  /// All other effects, which depend on the vehicle's own state.
-  struct Rest {
-    Interval force_N[3];
-    double rate_N_s[3] = {0, 0, 0};  ///< of the part whose rate is bounded
-    double abrupt_N[3] = {0, 0, 0};  ///< part that may change at any rate: the thrust's rate is unknown
-  };
-  /// @param acceleration_m_s2, thrust_rate_N_s bounds of |v'| and |(T b3)'|; used only for the rates.
-  Rest rest(Interval height_m, const Interval velocity_m_s[3], double acceleration_m_s2,
-            double thrust_rate_N_s) const;
+  /// Force of all other effects, which depend on the vehicle's own state.
+  std::array<Interval, 3> rest_N(Interval height_m, const std::array<Interval, 3>& velocity_m_s) const;
 
  private:
   struct Downwash {

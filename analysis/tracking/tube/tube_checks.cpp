@@ -22,19 +22,16 @@ double length(Interval x, Interval y, Interval z) {
   return sqrt(square(x) + square(y) + square(z)).upper;
 }
 
-double length(const double (&x)[3]) { return length(x[0], x[1], x[2]); }
-
 /// a x, where a factor of 0 takes precedence over an unknown one.
 double times(double a, double x) { return a == 0 || x == 0 ? 0 : up(a * x); }
 
 /// Bounds on one vehicle's loop that follow from the tube.
 struct Loads {
-  double integral_m_s[3] = {0, 0, 0};       ///< sup |int e|
-  double acceleration_m_s2[3] = {0, 0, 0};  ///< sup |e''|
-  double command_N[3] = {0, 0, 0};          ///< sup of the commanded force, without gravity
+  double integral_m_s[3] = {0, 0, 0};  ///< sup |int e|
+  double command_N[3] = {0, 0, 0};     ///< sup of the commanded force, without gravity
 };
 
-/// Bounds on the signals of one axis of one vehicle, per stretch.
+/// Bounds on the signals of one axis of one vehicle, per slice.
 struct AxisLoads {
   std::vector<double> error_N;       ///< force that is not modelled, including that of the held command
   std::vector<double> truth_N;       ///< sup of the true force
@@ -58,32 +55,24 @@ double estimate_error_N(const Scene& scene, std::size_t axis) {
                                                 times(loop.Ki, stepped_m_s(scene, axis))));
 }
 
-AxisLoads axis_loads(const Scene& scene, const LocalTube& tube, int vehicle, std::size_t axis) {
+AxisLoads axis_loads(const Scene& scene, const SlicedTube& tube, std::size_t i, std::size_t axis) {
   const Motion& motion = scene.motion();
   const double mass_kg = scene.tracking().plant.mass_kg;
-  const auto i = static_cast<std::size_t>(vehicle);
+  const double estimate_N = estimate_error_N(scene, axis);
   AxisLoads result;
-  for (const int s : motion.stretch_of[i]) {
-    const auto at = static_cast<std::size_t>(s);
-    result.truth_N.push_back(tube.tube.truth[at].force_N[axis].mag());
-    result.error_N.push_back(axis == 2 ? tube.tube.force_N[at] : result.truth_N.back());
-    result.met.add(scene.in_slice(motion.stretches[at], motion.slices - 1, axis, result.error_N.back(),
-                                  tube.tube.truth[at], tube.tube.radii.position_m[i][axis],
-                                  tube.tube.radii.velocity_m_s[i][axis]));
-    result.planned_m_s2.push_back(motion.stretches[at].acceleration_m_s2[axis].mag());
-    result.jerk_m_s3.push_back(motion.stretches[at].jerk_m_s3[axis].mag());
+  result.hold_N = largest(tube.hold_N[i][axis]);
+  for (std::size_t n = 0; n < tube.slices.size(); ++n) {
+    const Stretch& stretch = motion.stretches[static_cast<std::size_t>(motion.stretch_of[i][n])];
+    const Deviation& one = tube.slices[n][i];
+    result.truth_N.push_back(tube.truth[i][n][axis].mag());
+    const double unmodelled_N = axis == 2 ? tube.force_error_N[i][n].mag() : result.truth_N.back();
+    result.error_N.push_back(up(up(unmodelled_N + tube.hold_N[i][axis][n]) + estimate_N));
+    result.met.add(
+        scene.in_slice(static_cast<int>(n), one.position_m[axis].mag(), one.velocity_m_s[axis].mag()));
+    result.planned_m_s2.push_back(stretch.acceleration_m_s2[axis].mag());
+    result.jerk_m_s3.push_back(stretch.jerk_m_s3[axis].mag());
     result.lagged_N.push_back(up(result.truth_N.back() + up(mass_kg * result.planned_m_s2.back())));
   }
-  const std::vector<double> hold_by_slice_N =
-      tube.sliced.proved
-          ? tube.sliced.hold_N[i][axis]
-          : std::vector<double>(result.error_N.size(), scene.hold_error_N(vehicle, axis, result.met));
-  result.hold_N = largest(hold_by_slice_N);
-  for (std::size_t n = 0; result.hold_N > 0 && n < result.error_N.size(); ++n)
-    result.error_N[n] = up(result.error_N[n] + hold_by_slice_N[n]);
-  const double estimate_N = estimate_error_N(scene, axis);
-  for (double& error : result.error_N)
-    if (estimate_N > 0) error = up(error + estimate_N);
   return result;
 }
 
@@ -97,22 +86,20 @@ double lag_error_N(const ErrorLoop& loop, const AxisLoads& acting, double mass_k
 }
 
 /// Bound of the feedforward force along z, f_hat = f_a + (f_hat - f_a).
-double fed_forward_N(const LocalTube& tube, const std::vector<int>& stretches) {
+double fed_forward_N(const SlicedTube& tube, std::size_t i) {
   double fed_N = 0;
-  for (const int s : stretches) {
-    const auto at = static_cast<std::size_t>(s);
-    fed_N = std::max(fed_N, up(tube.tube.truth[at].force_N[2].mag() + tube.tube.force_N[at]));
-  }
+  for (std::size_t n = 0; n < tube.slices.size(); ++n)
+    fed_N = std::max(fed_N, up(tube.truth[i][n][2].mag() + tube.force_error_N[i][n].mag()));
   return fed_N;
 }
 
-Loads loads(const Scene& scene, const LocalTube& tube, int vehicle) {
+Loads loads(const Scene& scene, const SlicedTube& tube, int vehicle) {
   Loads result;
   const double mass_kg = scene.tracking().plant.mass_kg;
   const auto i = static_cast<std::size_t>(vehicle);
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const ErrorLoop& loop = scene.loops().axis[axis];
-    const AxisLoads acting = axis_loads(scene, tube, vehicle, axis);
+    const AxisLoads acting = axis_loads(scene, tube, i, axis);
     double& integral_m_s = result.integral_m_s[axis];
     // int e = h * (f_a - f_hat + m x) + g * w
     if (loop.h) integral_m_s = largest(convolved(*loop.h, acting.error_N));
@@ -128,106 +115,17 @@ Loads loads(const Scene& scene, const LocalTube& tube, int vehicle) {
     if (loop.h && loop.has_lag)
       integral_m_s = up(integral_m_s + times(up(excess_N * loop.lags_s.upper), loop.h->peak));
     // A held command differs from that of the continuous law by x.
-    const double feedback =
-        up(up(acting.hold_N / mass_kg) +
-           times(loop.Kp, up(tube.tube.radii.position_m[i][axis] + position_error_m)) +
-           up(times(loop.Kd, up(tube.tube.radii.velocity_m_s[i][axis] + velocity_error_m_s)) +
-              times(loop.Ki, integral_m_s)));
+    const double feedback = up(
+        up(acting.hold_N / mass_kg) + times(loop.Kp, up(acting.met.position_m + position_error_m)) +
+        up(times(loop.Kd, up(acting.met.velocity_m_s + velocity_error_m_s)) + times(loop.Ki, integral_m_s)));
     const double lag_N = lag_error_N(loop, acting, mass_kg);
-    result.acceleration_m_s2[axis] =
+    const double acceleration_m_s2 =
         up(feedback + up(up(up(largest(acting.error_N) + lag_N) + excess_N) / mass_kg));
-    integral_m_s = up(integral_m_s + sum_excess_m_s(loop, acting.met, result.acceleration_m_s2[axis]));
-    const double fed_N = axis == 2 ? fed_forward_N(tube, scene.motion().stretch_of[i]) : 0;
+    integral_m_s = up(integral_m_s + sum_excess_m_s(loop, acting.met, acceleration_m_s2));
+    const double fed_N = axis == 2 ? fed_forward_N(tube, i) : 0;
     result.command_N[axis] = up(up(mass_kg * up(feedback + largest(acting.planned_m_s2))) + fed_N);
   }
   return result;
-}
-
-ForceErrorBounds bounds_of(const Scene& scene, const LocalTube& tube, const std::vector<Loads>& loads,
-                           int vehicle, const std::vector<ForceConstants>& constants,
-                           const ErrorHistory& lag) {
-  ForceErrorBounds result;
-  result.vehicle = vehicle;
-  const Motion& motion = scene.motion();
-  const auto i = static_cast<std::size_t>(vehicle);
-  const Deviations deviations = all_within(tube.tube.radii);
-  const double slice_s = up(motion.slice_s * (1 + 1e-12));
-  double learned_rate = 0;
-  double abrupt_N = 0;
-  for (const int s : motion.stretch_of[i]) {
-    const auto at = static_cast<std::size_t>(s);
-    const Stretch& stretch = motion.stretches[at];
-    const double size_N = tube.tube.force_N[at];
-    result.amplitude_N = std::max(result.amplitude_N, size_N);
-    result.impulse_N_s = up(result.impulse_N_s + up(size_N * slice_s));
-    // The rate of the network follows from its constants, that of the truth from its gradient.
-    const std::vector<Interval> states = scene.states(stretch, deviations);
-    const ForceConstants none{kNotKnown, kNotKnown, kNotKnown, kNotKnown};
-    const ForceConstants& c = constants.empty() ? none : constants[i];
-    // The inputs of the network may jump by the estimation errors.
-    double learned = scene.estimates().are_zero() ? 0 : kNotKnown;
-    const double own_acceleration =
-        up(length(loads[i].acceleration_m_s2) +
-           length(stretch.acceleration_m_s2[0], stretch.acceleration_m_s2[1], stretch.acceleration_m_s2[2]));
-    const TruthForce::Rest rest = scene.rest(stretch, deviations, own_acceleration);
-    abrupt_N = std::max(abrupt_N, rest.abrupt_N[2]);
-    double truth = rest.rate_N_s[2];
-    for (int n = 0; n + 1 < scene.vehicles(); ++n) {
-      const auto k = static_cast<std::size_t>(n * kPerNeighbour);
-      const auto j = static_cast<std::size_t>(Scene::neighbour(vehicle, n));
-      const double speed = length(states[k + 3], states[k + 4], states[k + 5]);
-      const double* const a = loads[i].acceleration_m_s2;
-      const double* const b = loads[j].acceleration_m_s2;
-      const double acceleration = up(stretch.relative_acceleration_m_s2[static_cast<std::size_t>(n)] +
-                                     length(up(a[0] + b[0]), up(a[1] + b[1]), up(a[2] + b[2])));
-      learned = up(learned + slope_cost_N(c, speed, acceleration));
-      truth = up(truth + times(tube.tube.truth[at].gradient_N_m[static_cast<std::size_t>(n)], speed));
-    }
-    if (c.own > 0) {
-      const std::size_t own = states.size() - kOwnState;
-      const double speed = states[own + 3].mag();
-      learned = up(learned + times(c.own, length(speed, own_acceleration, 0)));
-    }
-    const double rate = up(learned + truth);
-    learned_rate = std::max(learned_rate, learned);
-    result.rate_N_s = std::max(result.rate_N_s, rate);
-    result.variation_N = up(result.variation_N + up(rate * slice_s));
-  }
-  // The force error starts with a step, which is not part of the rate and the variation of the slices.
-  const double start_N = tube.tube.force_N[static_cast<std::size_t>(motion.stretch_of[i].front())];
-  result.variation_N = up(result.variation_N + start_N);
-  const ErrorLoop& loop = scene.loops().axis[2];
-  result.lag_m = lag.largest_position_m();
-  const auto with_lag = [&](double bound) { return up(bound + result.lag_m); };
-  // Discontinuous parts count as an amplitude: the difference of the staircase from its source, and abrupt effects.
-  const double stair_m = times(loop.h1->total(), up(times(scene.network_age_s(), learned_rate) + abrupt_N));
-  result.by_rate_m = result.by_edges_m = kNotKnown;
-  if (loop.h) {
-    result.by_rate_m =
-        with_lag(up(up(times(loop.h->total(), result.rate_N_s) + up(loop.h->peak * start_N)) + stair_m));
-    result.by_edges_m = with_lag(up(times(loop.h->peak, result.variation_N) + stair_m));
-  }
-  result.by_amplitude_m = with_lag(up(loop.h1->total() * result.amplitude_N));
-  result.by_impulse_m = with_lag(up(loop.h1->peak * result.impulse_N_s));
-  for (const Deviations& slice : tube.slices)
-    result.by_slices_m = std::max(result.by_slices_m, slice[i].position_m[2].mag());
-  return result;
-}
-
-Interval common(Interval a, Interval b) { return {std::max(a.lower, b.lower), std::min(a.upper, b.upper)}; }
-
-/// Adds the errors of one vehicle per slice, as bounded by the sizes of all signals, within the bounds known already.
-void add_slices(const std::array<ErrorHistory, 3>& history, std::size_t vehicle,
-                std::vector<Deviations>& slices) {
-  for (std::size_t n = 0; n < slices.size(); ++n) {
-    Deviation& one = slices[n][vehicle];
-    for (std::size_t k = 0; k < 3; ++k) {
-      const double p = history[k].position_m[n];
-      const double v = history[k].velocity_m_s[n];
-      one.position_m[k] = common(one.position_m[k], {-p, p});
-      one.velocity_m_s[k] = common(one.velocity_m_s[k], {-v, v});
-    }
-  }
 }
 
 /// Withdraws the proof if an integrator could reach its limit.
@@ -343,7 +241,7 @@ void count_residual_cells(const Scene& scene, LocalTube& tube) {
   for (const std::vector<int>& of_vehicle : motion.stretch_of) {
     for (std::size_t n = 0; n < of_vehicle.size(); ++n) {
       const std::vector<Interval> states =
-          scene.states(motion.stretches[static_cast<std::size_t>(of_vehicle[n])], tube.slices[n]);
+          scene.states(motion.stretches[static_cast<std::size_t>(of_vehicle[n])], tube.sliced.slices[n]);
       for (const std::size_t cell : scene.residual()->reached(scene.offsets(states, states)))
         is_reached[cell] = 1;
     }
@@ -356,27 +254,15 @@ void count_residual_cells(const Scene& scene, LocalTube& tube) {
 
 }  // namespace
 
-void check_tube(const Scene& scene, const std::vector<ForceConstants>& constants, LocalTube& tube) {
+void check_tube(const Scene& scene, LocalTube& tube) {
   std::vector<Loads> all;
   for (int i = 0; i < scene.vehicles(); ++i) {
-    all.push_back(loads(scene, tube, i));
+    all.push_back(loads(scene, tube.sliced, i));
     check_integrators(scene, all.back(), tube);
   }
-  const Deviations deviations = all_within(tube.tube.radii);
-  tube.slices.assign(static_cast<std::size_t>(scene.motion().slices), deviations);
-  if (tube.sliced.proved) tube.slices = tube.sliced.slices;
-  for (int i = 0; i < scene.vehicles(); ++i) {
-    std::array<ErrorHistory, 3> history = scene.other_errors(i, tube.tube.truth);
-    const std::array<ErrorHistory, 3> hold =
-        scene.hold_errors(i, tube.tube.radii, tube.tube.force_N, tube.tube.truth);
-    for (std::size_t axis = 0; axis < 3; ++axis) history[axis].add(hold[axis]);
-    const ErrorHistory lag = history[2];
-    history[2] = scene.errors_z(i, tube.tube.force_N, lag);
-    add_slices(history, static_cast<std::size_t>(i), tube.slices);
-    tube.bounds.push_back(bounds_of(scene, tube, all, i, constants, lag));
-  }
+  tube.whole = tube.sliced.whole();
   count_residual_cells(scene, tube);
-  add_assumptions(scene, thrust_use(scene.tracking().plant, all), neighbours_are_near(scene, deviations),
+  add_assumptions(scene, thrust_use(scene.tracking().plant, all), neighbours_are_near(scene, tube.whole),
                   tube);
 }
 

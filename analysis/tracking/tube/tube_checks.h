@@ -1,13 +1,12 @@
-/// @file Force errors inside a proved tube, and the hypotheses that the tube itself implies.
+/// @file The hypotheses that a proved tube itself implies.
 #pragma once
 
 #include "analysis/tracking/tube/local_tube.h"
 
 namespace swarmcert::analysis {
 
-/// Fills bounds, slices and assumptions of a proved tube. Withdraws `proved`, with the reason, if the errors of the
-/// tube could drive an integrator to its limit.
-/// @param constants per vehicle, valid in the tube; used for rates; empty: unknown.
-void check_tube(const Scene& scene, const std::vector<ForceConstants>& constants, LocalTube& tube);
+/// Fills the whole and the assumptions of a proved tube. Withdraws `proved`, with the reason, if the errors of the tube
+/// could drive an integrator to its limit.
+void check_tube(const Scene& scene, LocalTube& tube);
 
 }  // namespace swarmcert::analysis

@@ -35,14 +35,11 @@ void KernelSum::add_signed(double start, double slope, double length) {
   norms_.edge = std::max(norms_.edge, std::abs(after - at_once_));
   const auto area = [&](double u) { return (before + (start / 2 + slope * u / 6) * u) * u; };
   if (before * after < 0) {
-    double from = 0;
-    double to = length;
-    for (int i = 0; i < 60; ++i) {  // the quadratic formula cancels if the slope is tiny
-      const double middle = (from + to) / 2;
-      const double here = before + (start + slope * middle / 2) * middle;
-      (here * before > 0 ? from : to) = middle;
-    }
-    norms_.rate += std::abs(area(from)) + std::abs(area(length) - area(from));
+    // The first root of before + start u + slope u^2 / 2, in the form that does not cancel: `start` is zero or has the
+    // other sign than `before`.
+    const double root = std::sqrt(std::max(0.0, start * start - 2 * slope * before));
+    const double at = std::min(length, 2 * std::abs(before) / (std::abs(start) + root));
+    norms_.rate += std::abs(area(at)) + std::abs(area(length) - area(at));
   } else {
     norms_.rate += std::abs(area(length));
   }
@@ -67,6 +64,14 @@ void KernelSum::add_stretch(const KernelStretch& stretch, double period_s) {
   norms_.edge = std::max(norms_.edge, std::abs(integral_ - at_once_));
 }
 
+void KernelSum::repeat(const KernelSum& before, const KernelSum& but_last, double share, double ratio) {
+  for (const auto gain : {&GainNorms::rate, &GainNorms::amplitude}) {
+    const double cycle = norms_.*gain - before.norms_.*gain - share * (norms_.*gain - but_last.norms_.*gain);
+    // The sum over all cycles from the first one on, of which those up to now are in the norms.
+    norms_.*gain = before.norms_.*gain + cycle / (1 - ratio);
+  }
+}
+
 KernelVariation force_variation(const SampledAdjoint& adjoint, const Eigen::RowVectorXd& after) {
   KernelVariation variation;
   adjoint.force_kernel(
@@ -81,6 +86,7 @@ namespace {
 
 /// Sums of a kernel that is linear on each period.
 struct OfForce {
+  static constexpr bool kSums = true;
   static constexpr double kLongest_rad = 0.5, kLongestSwing_rad = 1e300;
   KernelSum sum;
   double period_s;
@@ -89,10 +95,14 @@ struct OfForce {
   bool crosses_zero(double change) const { return sum.crosses_zero(change); }
   void stretch(const KernelStretch& s) { sum.add_stretch(s, period_s); }
   void rest(const KernelStretch& s) { sum.add_stretch(s, period_s); }
+  void repeat(const OfForce& before, const OfForce& but_last, double share, double ratio) {
+    sum.repeat(before.sum, but_last.sum, share, ratio);
+  }
 };
 
 /// Sums of samples, one per period.
 struct OfSamples {
+  static constexpr bool kSums = true;
   static constexpr double kLongest_rad = 0.5, kLongestSwing_rad = 1e300;
   KernelSum sum;
   double period_s;
@@ -104,6 +114,9 @@ struct OfSamples {
     sum.add_stretch(s, period_s);
   }
   void rest(const KernelStretch& s) { stretch(s); }
+  void repeat(const OfSamples& before, const OfSamples& but_last, double share, double ratio) {
+    sum.repeat(before.sum, but_last.sum, share, ratio);
+  }
 };
 
 /// @param sinks of the next outputs.
@@ -157,9 +170,7 @@ std::vector<GainNorms> sample_gains(const KernelWalk& walk, const Eigen::MatrixX
 }
 
 GainNorms command_gains(const SampledAdjoint& adjoint, const Eigen::RowVectorXd& output, bool with_own) {
-  const SampledModel& model = adjoint.model();
-  return input_gains(adjoint, output, Eigen::VectorXd::Unit(model.size() + 1, model.command_index()),
-                     with_own);
+  return input_gains(adjoint, output, adjoint.model().commanded().transpose(), with_own);
 }
 
 GainNorms input_gains(const SampledAdjoint& adjoint, const Eigen::RowVectorXd& output,

@@ -38,6 +38,10 @@ class KernelSum {
   /// The same with a jump before each repetition, scaled by the same ratio.
   void add_series(double jump, double start, double slope, double length, double ratio);
 
+  /// Adds what was added since `before` infinitely many times more, each time scaled by `ratio`, but only 1 - share of
+  /// what was added since `but_last`. The integral tends to zero.
+  void repeat(const KernelSum& before, const KernelSum& but_last, double share, double ratio);
+
   const GainNorms& norms() const { return norms_; }
 
  private:

@@ -51,7 +51,9 @@ class KernelWalk {
   /// @param sinks one per output. `period(start, end)` takes a single period, `stretch(s)` several, `rest(s)` the rest
   ///     of the kernel; a stretch over which one of them `crosses_zero(change)` is divided. A stretch lasts at most
   ///     Sink::kLongest_rad, in radians of the fastest mode that is left, and Sink::kLongestSwing_rad once a single
-  ///     oscillation is left; single periods may be longer.
+  ///     oscillation is left; single periods may be longer. If Sink::kSums, `repeat(before, but_last, share, ratio)`
+  ///     ends an oscillation: what was added since the sink was `before`, without `share` of the last period, which
+  ///     `but_last` lacks, is added infinitely many times more, each time scaled by `ratio`.
   template <std::size_t kLanes, class Sink>
   void run(const Eigen::MatrixXd& outputs, std::array<Sink, kLanes>& sinks) const;
 
@@ -96,7 +98,7 @@ class KernelWalk::Run {
     while (period < until) {
       const double most = Sink::kLongest_rad / adjoint.fastest_mode(period);
       std::size_t level = 0;
-      while (level + 1 < walk_.powers_.size() && std::ldexp(2.0, static_cast<int>(level)) <= most) ++level;
+      for (double length = 2; level + 1 < walk_.powers_.size() && length <= most; length *= 2) ++level;
       advance(now, level, next);
       std::swap(now, next);
       period += 1L << level;
@@ -112,61 +114,118 @@ class KernelWalk::Run {
   }
 
  private:
-  /// Goes on with a single oscillation, from one change of a sign to the next: each functional is Re(z mode^j).
+  /// A functional of a single oscillation, Re(z mode^j), and the periods until its next zero and its next extremum.
+  struct Wave {
+    std::complex<double> z;
+    double zero = 0, extremum = 0;
+  };
+
+  /// A single oscillation of mode exp(log_mode) in one lane: goes from one change of a sign to the next.
+  class Oscillation {
+   public:
+    /// @param a, b values of the functionals in this period and in the next one.
+    Oscillation(const Point& a, const Point& b, Eigen::Index lane, std::complex<double> log_mode)
+        : log_mode_(log_mode),
+          half_cycle_(kPi / log_mode.imag()),
+          longest_(std::max(1.0, std::floor(Sink::kLongestSwing_rad / log_mode.imag()))) {
+      const std::complex<double> mode = std::exp(log_mode);
+      for (std::size_t c = 0; c < kColumns; ++c) {
+        const double v = a.value[c][lane], next = b.value[c][lane];
+        Wave& wave = waves_[c];
+        wave.z = {v, (v * mode.real() - next) / mode.imag()};
+        wave.zero = until(wave.z, kPi / 2);
+        wave.extremum = until(wave.z, std::atan(log_mode.real() / log_mode.imag()));
+      }
+    }
+
+    void walk(double periods, Sink& sink) {
+      while (periods > 0) periods -= swing(std::min(longest_, periods), sink);
+    }
+
+    /// Walks `periods`, the end of which is that of the kernel. Sums do not need all of them: half cycles repeat,
+    /// smaller by the same ratio, up to the squared angle of a period, by which they depend on where they begin in a
+    /// period.
+    void walk_to_end(double periods, Sink& sink) {
+      if constexpr (Sink::kSums) {
+        constexpr double kResolved = 1e-12;
+        const double decay = -log_mode_.real(), turn = log_mode_.imag();
+        const double settled = std::ceil(std::max(0.0, std::log(turn * turn / kResolved) / decay));
+        const double block = std::ceil(half_cycle_);
+        if (settled + block < periods) {
+          walk(settled, sink);
+          const Sink before = sink;
+          walk(block - 1, sink);
+          const Sink but_last = sink;
+          walk(1, sink);
+          return sink.repeat(before, but_last, block - half_cycle_, std::exp(-decay * half_cycle_));
+        }
+      }
+      walk(periods, sink);
+    }
+
+   private:
+    static constexpr double kPi = 3.141592653589793;
+
+    /// Returns the periods until the phase of z mode^j is `angle`, up to half turns.
+    double until(std::complex<double> z, double angle) const {
+      const double ahead = std::fmod(angle - std::arg(z), kPi);
+      return (ahead < 0 ? ahead + kPi : ahead) / log_mode_.imag();
+    }
+
+    /// Hands the periods up to the next change of a sign, at most `most`, to the sink. Returns their number.
+    double swing(double most, Sink& sink) {
+      KernelStretch s;
+      s.start = waves_[kStart].z.real();
+      s.end = waves_[kEnd].z.real();
+      s.peak = s.least = std::abs(s.start);
+      s.include(s.end);
+      s.left = waves_[kLeft].z.real();
+      s.periods = std::min({most, std::ceil(waves_[kStart].zero), std::ceil(waves_[kEnd].zero),
+                            std::ceil(waves_[kLeft].zero) - 1});
+      if (s.start * s.end < 0 || !(s.periods > 1)) s.periods = 1;
+      std::complex<double> step = std::exp(s.periods * log_mode_);
+      s.change = s.left - (waves_[kLeft].z * step).real();
+      if (s.periods > 1 && sink.crosses_zero(s.change)) s.periods = 1, step = std::exp(log_mode_);
+      s.area = waves_[kArea].z.real() - (waves_[kArea].z * step).real();
+      for (const Column c : {kStart, kEnd}) include_extremum(waves_[c], s);
+      for (Wave& wave : waves_) advance(wave, s.periods, step);
+      s.include(waves_[kStart].z.real());
+      s.include(waves_[kEnd].z.real());
+      if (s.periods > 1) {
+        sink.stretch(s);
+      } else {
+        sink.period(s.start, s.end);
+      }
+      return s.periods;
+    }
+
+    void include_extremum(const Wave& wave, KernelStretch& s) const {
+      for (const double at : {std::floor(wave.extremum), std::ceil(wave.extremum)})
+        if (at <= s.periods) s.include((wave.z * std::exp(at * log_mode_)).real());
+    }
+
+    void advance(Wave& wave, double periods, std::complex<double> step) const {
+      wave.z *= step;
+      for (double* const next : {&wave.zero, &wave.extremum}) {
+        *next -= periods;
+        while (*next < 0) *next += half_cycle_;
+      }
+    }
+
+    std::complex<double> log_mode_;
+    double half_cycle_, longest_;  ///< periods
+    std::array<Wave, kColumns> waves_;
+  };
+
   void oscillate(const Point& a, long periods) {
     Point b = a;
     multiply(a, 0, b);
     evaluate(b);
-    const std::complex<double> mode = walk_.adjoint_->last_pair()->mode;
-    const std::complex<double> log_mode = std::log(mode);
-    const double most = std::max(1.0, std::floor(Sink::kLongestSwing_rad / log_mode.imag()));
+    const std::complex<double> log_mode = std::log(walk_.adjoint_->last_pair()->mode);
     for (std::size_t lane = 0; lane < kLanes; ++lane) {
-      std::array<std::complex<double>, kColumns> z;
-      for (std::size_t c = 0; c < kColumns; ++c) {
-        const double v = a.value[c][static_cast<Eigen::Index>(lane)];
-        const double next = b.value[c][static_cast<Eigen::Index>(lane)];
-        z[c] = {v, (v * mode.real() - next) / mode.imag()};
-      }
-      for (double left = static_cast<double>(periods); left > 0;)
-        left -= swing(z, log_mode, std::min(most, left), sinks_[lane]);
+      Oscillation one(a, b, static_cast<Eigen::Index>(lane), log_mode);
+      one.walk_to_end(static_cast<double>(periods), sinks_[lane]);
     }
-  }
-
-  /// Hands the periods up to the next change of a sign to the sink and moves `z` past them. Returns their number.
-  static double swing(std::array<std::complex<double>, kColumns>& z, std::complex<double> log_mode,
-                      double most, Sink& sink) {
-    constexpr double kPi = 3.141592653589793;
-    const double turn = log_mode.imag();
-    // Periods until the phase of a functional is `angle`, up to half turns.
-    const auto until = [&](Column c, double angle) {
-      const double ahead = std::fmod(angle - std::arg(z[c]), kPi);
-      return (ahead < 0 ? ahead + kPi : ahead) / turn;
-    };
-    KernelStretch s;
-    s.start = z[kStart].real();
-    s.end = z[kEnd].real();
-    s.peak = s.least = std::abs(s.start);
-    s.include(s.end);
-    s.left = z[kLeft].real();
-    s.periods = std::min({most, std::ceil(until(kStart, kPi / 2)), std::ceil(until(kEnd, kPi / 2)),
-                          std::ceil(until(kLeft, kPi / 2)) - 1});
-    if (s.start * s.end < 0 || !(s.periods > 1)) s.periods = 1;
-    std::complex<double> step = std::exp(s.periods * log_mode);
-    s.change = s.left - (z[kLeft] * step).real();
-    if (s.periods > 1 && sink.crosses_zero(s.change)) s.periods = 1, step = std::exp(log_mode);
-    s.area = z[kArea].real() - (z[kArea] * step).real();
-    for (const Column c : {kStart, kEnd}) {
-      const double extremum = until(c, std::atan(log_mode.real() / turn));
-      for (const double at : {std::floor(extremum), std::ceil(extremum), s.periods})
-        if (at <= s.periods) s.include((z[c] * std::exp(at * log_mode)).real());
-    }
-    if (s.periods > 1) {
-      sink.stretch(s);
-    } else {
-      sink.period(s.start, s.end);
-    }
-    for (std::complex<double>& one : z) one *= step;
-    return s.periods;
   }
 
   void evaluate(Point& point) const {
@@ -204,7 +263,7 @@ class KernelWalk::Run {
         continue;
       }
       const auto l = static_cast<Eigen::Index>(lane);
-      s.periods = std::ldexp(1.0, static_cast<int>(level));
+      s.periods = static_cast<double>(1L << level);
       s.include(b.value[kStart][l]);
       s.include(b.value[kEnd][l]);
       s.change = s.left - b.value[kLeft][l];

@@ -45,6 +45,8 @@ double acceleration_age_s(const AxisLoop& loop) {
 
 double acceleration_age_s(const SampledLoop& loop) { return acceleration_age_s(loop.plant) + loop.period_s; }
 
+double jerk_gain(const AxisLoop& loop) { return loop.mass_kg * lag_floor(loop).rate; }
+
 double jerk_gain(const SampledLoop& loop) {
   const SampledAdjoint adjoint(loop);
   if (!adjoint.is_stable()) return kInfinity;
@@ -55,9 +57,7 @@ double jerk_gain(const SampledLoop& loop) {
     const double phase_s = i * step_s;
     most = std::max(most, gain_to(adjoint, adjoint.output_after_control(phase_s), phase_s, true, true));
   }
-  const Eigen::RowVectorXd commanded =
-      Eigen::RowVectorXd::Unit(adjoint.model().size() + 1, adjoint.model().command_index());
-  const double feedback = gain_to(adjoint, commanded, 0, false, false);
+  const double feedback = gain_to(adjoint, adjoint.model().commanded(), 0, false, false);
   return most + step_s * step_s / 8 * (acceleration_age_s(loop) + feedback);
 }
 

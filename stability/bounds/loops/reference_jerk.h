@@ -24,5 +24,7 @@ double acceleration_age_s(const SampledLoop& loop);
 /// times |e''|, and |e''| <= (acceleration_age_s() + the gain to the feedback's command) |p_d'''|, which is added.
 /// Infinite if the loop is unstable.
 double jerk_gain(const SampledLoop& loop);
+/// The same for a continuous loop: lag_floor().rate per unit of acceleration.
+double jerk_gain(const AxisLoop& loop);
 
 }  // namespace swarmcert::stability

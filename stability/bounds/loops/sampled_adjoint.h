@@ -68,7 +68,7 @@ class SampledAdjoint {
   /// ..., and finish(kernel, ratio) as above.
   template <class Visit, class Finish>
   void command_kernel(const Eigen::RowVectorXd& after, const Visit& visit, const Finish& finish) const {
-    const Eigen::VectorXd input = Eigen::VectorXd::Unit(model_.size() + 1, model_.command_index());
+    const Eigen::VectorXd input = model_.commanded().transpose();
     const Eigen::VectorXd held = model_.hold() * input;
     const auto kernel_of = [&](const std::vector<double>& row) {
       double kernel = 0;

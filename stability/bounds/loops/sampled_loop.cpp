@@ -33,7 +33,7 @@ class PhaseGains {
  public:
   PhaseGains(const SampledLoop& loop, Channel channel) : adjoint_(loop) {
     const SampledModel& model = adjoint_.model();
-    if (channel == Channel::kCommand) input_ = Eigen::VectorXd::Unit(model.size() + 1, model.command_index());
+    if (channel == Channel::kCommand) input_ = model.commanded().transpose();
     prepare();
   }
   PhaseGains(const SampledLoop& loop, Estimate estimate) : adjoint_(loop) {

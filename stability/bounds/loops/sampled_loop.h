@@ -31,12 +31,27 @@ enum class Instants {
 /// Returns the exact norms of the sampled loop. Channel kForce: a disturbance in continuous time. Channel kCommand: an
 /// error that the loop adds to its command once per period; `rate` then means |eps_k - eps_(k-1)| <= period, `impulse`
 /// period sum|eps_k| <= 1. Computed by the adjoint: the kernel is a polynomial on each period before the output's time,
-/// and its sign changes are roots of that polynomial. With kAll the worst phase is searched on nine phases and refined.
-/// Relative error about 1e-10. All infinite if the spectral radius is not below 1.
+/// and its sign changes are roots of that polynomial. Relative error at one phase of the period about 1e-10. With kAll
+/// the worst phase is searched on eight phases and refined, which may miss some 1e-5 of lightly damped loops. All
+/// infinite if the spectral radius is not below 1.
 GainNorms sampled_norms(const SampledLoop& loop, Channel channel, Instants instants);
 
 /// The same for an error of an estimate, which the loop reads once per period, per m/s or per m.
 GainNorms sampled_norms(const SampledLoop& loop, Estimate estimate, Instants instants);
+
+/// The same calls for both kinds of loop: the gains at all times, and the parameters.
+template <class Input>
+GainNorms norms_of(const AxisLoop& loop, Input input) {
+  return continuous_norms(loop, input);
+}
+template <class Input>
+GainNorms norms_of(const SampledLoop& loop, Input input) {
+  return sampled_norms(loop, input, Instants::kAll);
+}
+inline AxisLoop& plant_of(AxisLoop& loop) { return loop; }
+inline AxisLoop& plant_of(SampledLoop& loop) { return loop.plant; }
+inline const AxisLoop& plant_of(const AxisLoop& loop) { return loop; }
+inline const AxisLoop& plant_of(const SampledLoop& loop) { return loop.plant; }
 
 /// Returns |u|_oo per |f|_oo for the feedback part u of the commanded force, N/N (force channel).
 double effort_gain(const SampledLoop& loop);

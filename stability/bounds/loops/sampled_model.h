@@ -33,6 +33,8 @@ class SampledModel {
   Eigen::Index integral_index() const { return plant_; }
   /// Index of the new command after the control.
   Eigen::Index command_index() const { return plant_ + 1; }
+  /// The new command as a row over the state after the control; transposed, a unit error that is added to it.
+  Eigen::RowVectorXd commanded() const { return Eigen::RowVectorXd::Unit(size() + 1, command_index()); }
 
  private:
   /// Adds the attitude loop to the plant: states 2 and on, before the lags.

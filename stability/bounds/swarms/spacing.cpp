@@ -120,7 +120,7 @@ Spacing spacing(const FlownLoop& loop, const DownwashField& field, const Disturb
   result.least_gap_to_stay_m = kInfinity;
   result.least_gap_to_cross_m = kInfinity;
   const LowerVehicle lower(loop, question.dwell_s, beside);
-  const PerAxis sideways = saturation(loop, beside, {}).feedback_N;
+  const PerAxis sideways = thrust_demand(loop, beside, {}).feedback_N;
   const double limit_m = question.max_error_m;
   for (int i = 0; i < question.steps; ++i) {
     SpacingRow row;
