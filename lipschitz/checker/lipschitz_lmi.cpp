@@ -174,9 +174,63 @@ bool BentChain::is_bent() const {
   });
 }
 
-SymmetricMatrix lipschitz_lmi(const BentChain& chain, const Dyadic& rho, const std::vector<Dyadic>& t) {
-  if (chain.slopes.size() != hidden_neurons(chain.stages))
+std::size_t BentChain::multipliers() const {
+  if (groups.empty()) return slopes.size();
+  std::size_t count = 0;
+  for (std::size_t k = 0; k < groups.size(); ++k)
+    count += static_cast<std::size_t>(groups[k] == 1 ? stages[k].rows : 2 * (stages[k].rows / groups[k]));
+  return count;
+}
+
+namespace {
+
+/// The multipliers of a chain, by neuron, and those of the sums of groups, by layer.
+struct Multipliers {
+  std::vector<Dyadic> own;
+  std::vector<std::vector<Dyadic>> sums;
+};
+
+Multipliers spread(const BentChain& chain, const std::vector<Dyadic>& t) {
+  if (chain.slopes.size() != hidden_neurons(chain.stages) || t.size() != chain.multipliers())
     throw std::invalid_argument("lipschitz_lmi: there is not one range of slopes per hidden neuron");
+  if (chain.groups.empty()) return {t, {}};
+  Multipliers result;
+  auto next = t.begin();
+  for (std::size_t k = 0; k < chain.groups.size(); ++k) {
+    const int rows = chain.stages[k].rows, group = chain.groups[k];
+    if (rows % group != 0) throw std::invalid_argument("lipschitz_lmi: a layer is no multiple of its group");
+    for (int i = 0; i < rows; ++i) result.own.push_back(next[i / group]);
+    next += rows / group;
+    const auto past = group == 1 ? next : next + rows / group;
+    result.sums.emplace_back(next, past);
+    next = past;
+  }
+  return result;
+}
+
+/// Adds the squares of the sums of a layer's groups, of what enters less of what leaves them. `before`: the first
+/// variable that enters the layer.
+void add_squares_of_sums(const Matrix& m, int group, const std::vector<Dyadic>& t, int before, Matrix& p) {
+  for (std::size_t g = 0; g < t.size(); ++g) {
+    const int first = static_cast<int>(g) * group;
+    std::vector<Dyadic> row(static_cast<std::size_t>(m.cols) + static_cast<std::size_t>(m.rows));
+    for (int i = first; i < first + group; ++i) {
+      for (int j = 0; j < m.cols; ++j) row[j] += m(i, j);
+      row[m.cols + i] = -1.0;
+    }
+    for (std::size_t i = 0; i < row.size(); ++i) {
+      if (row[i].sign() == 0) continue;
+      const Dyadic factor = t[g] * row[i];
+      for (std::size_t j = 0; j < row.size(); ++j)
+        p(before + static_cast<int>(i), before + static_cast<int>(j)) += factor * row[j];
+    }
+  }
+}
+
+}  // namespace
+
+SymmetricMatrix lipschitz_lmi(const BentChain& chain, const Dyadic& rho, const std::vector<Dyadic>& stated) {
+  const auto [t, sums] = spread(chain, stated);
   if (!chain.is_bent()) return lipschitz_lmi(chain.stages, rho, t);
   Matrix q(chain.stages.front().cols, chain.stages.front().cols);
   for (int i = 0; i < q.rows; ++i) q(i, i) = rho;
@@ -199,6 +253,7 @@ SymmetricMatrix lipschitz_lmi(const BentChain& chain, const Dyadic& rho, const s
     const Matrix square = product(transposed(m), bent);
     for (int i = 0; i < m.cols; ++i)
       for (int j = 0; j < m.cols; ++j) p(before + i, before + j) += square(i, j);
+    if (!sums.empty()) add_squares_of_sums(m, chain.groups[k], sums[k], before, p);
     before += m.cols;
   }
   return p;
