@@ -208,23 +208,24 @@ Multipliers spread(const BentChain& chain, const std::vector<Dyadic>& t) {
   return result;
 }
 
-/// Adds the squares of the sums of a layer's groups, of what enters less of what leaves them. `before`: the first
-/// variable that enters the layer.
-void add_squares_of_sums(const Matrix& m, int group, const std::vector<Dyadic>& t, int before, Matrix& p) {
-  for (std::size_t g = 0; g < t.size(); ++g) {
-    const int first = static_cast<int>(g) * group;
-    std::vector<Dyadic> row(static_cast<std::size_t>(m.cols) + static_cast<std::size_t>(m.rows));
-    for (int i = first; i < first + group; ++i) {
-      for (int j = 0; j < m.cols; ++j) row[j] += m(i, j);
-      row[m.cols + i] = -1.0;
-    }
-    for (std::size_t i = 0; i < row.size(); ++i) {
-      if (row[i].sign() == 0) continue;
-      const Dyadic factor = t[g] * row[i];
-      for (std::size_t j = 0; j < row.size(); ++j)
-        p(before + static_cast<int>(i), before + static_cast<int>(j)) += factor * row[j];
-    }
+/// Returns the matrix of the squares of the sums of a layer's groups, of what enters less of what leaves them, over the
+/// variables that enter and those that leave the layer.
+Matrix squares_of_sums(const Matrix& m, int group, const std::vector<Dyadic>& t) {
+  const int groups = static_cast<int>(t.size());
+  Matrix rows(groups, m.cols + m.rows);
+  for (int i = 0; i < m.rows; ++i) {
+    for (int j = 0; j < m.cols; ++j) rows(i / group, j) += m(i, j);
+    rows(i / group, m.cols + i) = -1.0;
   }
+  Matrix weighted = rows;
+  for (int g = 0; g < groups; ++g)
+    for (int j = 0; j < rows.cols; ++j) weighted(g, j) = t[static_cast<std::size_t>(g)] * rows(g, j);
+  return product(transposed(rows), weighted);
+}
+
+void add_block(const Matrix& block, int at, Matrix& p) {
+  for (int i = 0; i < block.rows; ++i)
+    for (int j = 0; j < block.cols; ++j) p(at + i, at + j) += block(i, j);
 }
 
 }  // namespace
@@ -250,10 +251,8 @@ SymmetricMatrix lipschitz_lmi(const BentChain& chain, const Dyadic& rho, const s
       const Dyadic factor = Dyadic(2.0) * chain.slopes[next].low * chain.slopes[next].high * t[next];
       for (int j = 0; j < m.cols; ++j) bent(i, j) = factor * m(i, j);
     }
-    const Matrix square = product(transposed(m), bent);
-    for (int i = 0; i < m.cols; ++i)
-      for (int j = 0; j < m.cols; ++j) p(before + i, before + j) += square(i, j);
-    if (!sums.empty()) add_squares_of_sums(m, chain.groups[k], sums[k], before, p);
+    add_block(product(transposed(m), bent), before, p);
+    if (!sums.empty() && !sums[k].empty()) add_block(squares_of_sums(m, chain.groups[k], sums[k]), before, p);
     before += m.cols;
   }
   return p;
