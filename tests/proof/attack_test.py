@@ -22,7 +22,8 @@ import canonical  # noqa: E402
 COUNT, MUTATIONS, CHECKER, CHECK_MANY = int(sys.argv[3]), int(sys.argv[4]), sys.argv[5], sys.argv[6]
 #: Names of --activation, between all layers or layer by layer; their values are those of FUNCTIONS.
 KINDS = ["relu", "tanh", "maxmin:pairs", "leaky_relu:0.2", "silu", "groupsort:4", "hardtanh", "gelu", "maxmin:halves",
-         "relu6", "softplus", "groupsort:3", "elu", "relu,tanh", "selu", "sigmoid", "groupsort:2,relu", "relu,maxmin:pairs"]
+         "relu6", "softplus", "groupsort:3", "elu", "relu,tanh", "selu", "sigmoid", "groupsort:2,relu",
+         "relu,maxmin:pairs"]
 FUNCTIONS = {**canonical.FUNCTIONS, "leaky_relu:0.2": lambda t: max(t, 0.0) + 0.2 * min(t, 0.0),
              "hardtanh": lambda t: min(max(t, -1.0), 1.0), "relu6": lambda t: min(max(t, 0.0), 6.0)}
 
@@ -138,7 +139,8 @@ def mutate(original, generator, count, folder, net):
     codes = [[int(line.split("\t")[0]) for line in done.stdout.splitlines()] for done in answers]
     assert len(codes[0]) == len(codes[1]) == count, answers
     for path, line, first, second in zip(paths, answers[0].stdout.splitlines(), *codes):
-        assert first == second or common.is_of_files(line.partition("\t")[2]), f"{net}: {first} and {second}: {path.read_text()[:2000]}"
+        assert first == second or common.is_of_files(line.partition("\t")[2]), \
+            f"{net}: {first} and {second}: {path.read_text()[:2000]}"
 
 
 def leaf_of(certificate, generator):

@@ -1,4 +1,5 @@
-(** The LipSDP argument where the slopes of each neuron lie in a range [a, b] of its own, or where groups of numbers keep
+(** The LipSDP argument where the slopes of each neuron lie in a range [a, b] of its own, or where groups of numbers
+  keep
   their sum and come no further apart: what a layer adds to the quadratic form has the square of what enters it, so that
   the inputs stay in the matrix. *)
 From Coq Require Import List Reals Lra Lia Psatz.
@@ -176,7 +177,8 @@ Proof.
     { unfold sums. induction (n * k)%nat as [|i IH]; simpl; auto. rewrite IH. f_equal. ring. }
     assert (products Rmult (repeat (-1, 1) (n * k)) = repeat (-1) (n * k)) as ->.
     { unfold products. induction (n * k)%nat as [|i IH]; simpl; auto. rewrite IH. f_equal. ring. }
-    rewrite times_repeat by now rewrite length_spread, L. rewrite times_scale, dot_scale_r, repeat_times_zeros, times_zeros.
+    rewrite times_repeat by now rewrite length_spread, L. rewrite times_scale, dot_scale_r, repeat_times_zeros,
+      times_zeros.
     rewrite dot_comm with (u := dz) (v := repeat 0 _), dot_zeros.
     pose proof (groups_constraint n k l dy dz H L Hl). lra.
 Qed.
@@ -228,7 +230,8 @@ Proof.
           rewrite !map_length, length_scale_rows by congruence; lia).
     rewrite apply_scale_all, !apply_scale_rows, dot_scale_l, (dot_comm _ (minus z z')), !times_scale, !dot_scale_r.
     pose proof (related_constraint rel (r, t2, m) y y' z z' Hf Hrel Hp2) as C. cbv zeta in C.
-    unfold ranges_of, multipliers_of in C. cbn [fst snd] in C. unfold y, y' in C. rewrite minus_affine in C by auto. lra.
+    unfold ranges_of, multipliers_of in C. cbn [fst snd] in C. unfold y, y' in C. rewrite minus_affine in C by auto.
+      lra.
 Qed.
 
 (** Rows that vanish, layer by layer. *)

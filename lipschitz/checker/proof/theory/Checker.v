@@ -410,7 +410,8 @@ Theorem check_sound rs hidden last upper rho t f : check rs hidden last upper rh
   norm (minus (run l x) (run l x')) <= real upper * norm (minus x x').
 Proof.
   unfold check. intros H [ks [last' b]] [Hks Hb] x x' Hx Hx' A. simpl in Hks, Hb, A.
-  apply andb_prop in H. destruct H as [G H]. apply andb_prop in G. destruct G as [_ G]. repeat (apply andb_prop in H; destruct H as [H ?]).
+  apply andb_prop in H. destruct H as [G H]. apply andb_prop in G. destruct G as [_ G].
+    repeat (apply andb_prop in H; destruct H as [H ?]).
   apply Nat.eqb_eq in H. rename H into Hn, H0 into HP, H1 into Hur, H2 into Hu, H3 into Hrho, H4 into Ht.
   apply shows_nonnegative_sound in HP. apply real_nonnegative in Hu, Hur. apply real_positive in Hrho.
   rewrite real_add, real_mul, real_neg in Hur.

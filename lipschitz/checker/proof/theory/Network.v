@@ -141,7 +141,8 @@ Qed.
 Lemma dot_times_app (u v t w : list R) : length t = length u ->
   dotR (u ++ v) (timesR (t ++ w) (u ++ v)) = dotR u (timesR t u) + dotR v (timesR w v).
 Proof.
-  revert t. induction u as [|a u IH]; intros [|b t]; simpl; try discriminate; intros H; [ring|]. rewrite IH by lia. ring.
+  revert t. induction u as [|a u IH]; intros [|b t]; simpl; try discriminate; intros H; [ring|]. rewrite IH by lia.
+    ring.
 Qed.
 Lemma groups_constraint n k t dy dz : groups_within n k dy dz -> length t = n -> Forall (Rle 0) t ->
   dotR dz (timesR (spread k t) dz) <= dotR dy (timesR (spread k t) dy).

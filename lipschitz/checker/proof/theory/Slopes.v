@@ -86,7 +86,8 @@ Lemma whole_activated {A} a (rows : list A) y : chained a rows = true -> length 
   activated a y = whole a y.
 Proof.
   assert (forall a y, changes_numbers a = true -> activated a y = whole_by_number a y) as W.
-  { clear. intros a y H. revert y. induction a as [| | | | | | | |s|n a IH]; intros y; try discriminate; try reflexivity.
+  { clear. intros a y H. revert y. induction a as [| | | | | | | |s|n a IH]; intros y; try discriminate;
+    try reflexivity.
     unfold whole_by_number in *. cbn [activated by_number]. now rewrite IH, map_id. }
   intros H L. destruct a as [| | | | | | | |[k| |]|n a]; try discriminate; try reflexivity; cbn [chained] in H.
   - unfold whole. cbn [in_groups activated]. rewrite L, H. apply Nat.eqb_eq in H. apply sort_groups. congruence.
@@ -109,7 +110,8 @@ Proof.
     timesR (reals (units a rows)) (divided a y) = whole a y) as G.
   { intros E L. destruct a as [| | | | | | | |[k| |]|n a]; auto. unfold divided, whole. cbn [in_groups].
     assert (forall u, length u = length rows -> timesR (reals (units (Sorted (Groups k)) rows)) u = u) as U.
-    { clear. unfold units. cbn [by_number]. induction rows as [|r rows IH]; intros [|c u]; simpl; try discriminate; auto.
+    { clear. unfold units. cbn [by_number]. induction rows as [|r rows IH]; intros [|c u]; simpl; try discriminate;
+      auto.
       intros H. rewrite IH by lia. unfold unit_of. cbn [is_rising steepest]. rewrite real_one. f_equal. ring. }
     apply U. destruct (Nat.eqb_spec (length y) (length y / k * k)) as [F|]; auto. rewrite length_groups; congruence. }
   intros L. apply G; auto. revert L. clear G.
@@ -154,7 +156,8 @@ Proof.
   intros F H. assert (forall l, In l (hidden p) -> length (snd l) = length (fst l)) as B
     by (intros l I; apply (fits_layer p); auto; apply in_or_app; now left).
   revert H. unfold chained_between, unclamped, functions_and_layers. generalize (between p) as s. revert x B.
-  induction (hidden p) as [|l ls IH]; intros x B s H; simpl; auto. simpl in H. apply andb_prop in H. destruct H as [E H].
+  induction (hidden p) as [|l ls IH]; intros x B s H; simpl; auto. simpl in H. apply andb_prop in H.
+    destruct H as [E H].
   rewrite IH; auto; [|intros; apply B; now right]. f_equal.
   apply (whole_activated _ (fst l)); auto. rewrite length_affine, map_length; auto.
   rewrite !map_length. apply B. now left.
@@ -276,9 +279,11 @@ Lemma divided_along p x x' : fits_part p = true -> chained_between p = true ->
 Proof.
   intros H C. destruct (instance_matrices p H) as [I _].
   apply along_everywhere; [now apply (stages_fit (fst (matrices p)))|].
-  revert C. clear. unfold relations_by, stack_of, chained_between. destruct (hidden p) as [|first later]; [constructor|].
+  revert C. clear. unfold relations_by, stack_of, chained_between.
+    destruct (hidden p) as [|first later]; [constructor|].
   cbn. intros C. apply andb_prop in C. destruct C as [C1 C].
-  assert (forall a (l : layerD) y y', chained a (fst l) = true -> length y = length (fst l) -> length y' = length (fst l)
+  assert (forall a (l : layerD) y y', chained a (fst l) = true -> length y = length (fst l) -> length y' = length
+    (fst l)
     -> related (real_relation (relation_by divided_ranges a (fst l))) y y' (divided a y) (divided a y')) as G.
   { clear. intros a l y y' C L L'. apply (related_in_groups _ _ a (fst l)); auto.
     intros _. now apply divided_increments. }
@@ -286,7 +291,8 @@ Proof.
   - cbn [fst snd weights real_layer]. intros y y' L L'. rewrite map_length in L, L'. now apply G.
   - revert C. generalize (reals (units (hd Relu (between p)) (fst first))) as b, (tl (between p)) as s.
     clear C1. induction later as [|l later IH]; intros b s C; cbn in C |- *; constructor.
-    + cbn [fst snd weights scaled_layer real_layer]. intros y y' L L'. rewrite !map_length in L, L'. apply andb_prop in C.
+    + cbn [fst snd weights scaled_layer real_layer]. intros y y' L L'. rewrite !map_length in L, L'.
+      apply andb_prop in C.
       now apply G.
     + apply andb_prop in C. now apply IH.
 Qed.
@@ -437,7 +443,8 @@ Proof.
   intros H. apply (G (length y)); auto.
 Qed.
 Lemma pairs_of_interleaved f (u v : list R) : length u = length v -> of_pairs f (interleaved u v) = both f u v.
-Proof. revert v. induction u as [|a u IH]; intros [|b v]; simpl; try discriminate; auto. intros. unfold both in *. simpl.
+Proof. revert v. induction u as [|a u IH]; intros [|b v]; simpl; try discriminate; auto. intros. unfold both in *.
+  simpl.
   now rewrite IH by lia. Qed.
 (** What leaves sorted pairs, and the same numbers in their other places. *)
 Definition turned_into (turn : bool) (x x' : list R) : Prop :=
@@ -476,7 +483,8 @@ Proof.
       let r := regrouped_layers turn between ((m, b) :: hidden) last in
       layer_by_layer (fst r) (map real_layer (fst (snd r))) (real_layer (snd (snd r))) x' =
       layer_by_layer between (map real_layer ((m, b) :: hidden)) (real_layer last) x) as Same.
-    { intros a -> E. cbv zeta. cbn [fst snd map layer_by_layer hd tl real_layer]. rewrite Y, E. fold y. apply IH; auto; [reflexivity|discriminate]. }
+    { intros a -> E. cbv zeta. cbn [fst snd map layer_by_layer hd tl real_layer]. rewrite Y, E. fold y.
+      apply IH; auto; [reflexivity|discriminate]. }
     assert (forall s rows bias, (Sorted s = hd Relu between) -> affine (realm rows) (reals bias) x' =
         match s with Halves => by_pairs y | _ => y end -> s = Halves \/ s = Pairs ->
       Nat.even (length m) = true -> Forall (fun r => length r = length m) (fst (hd last hidden)) ->
@@ -484,7 +492,8 @@ Proof.
       layer_by_layer (Sorted (Groups 2) :: fst rest) (map real_layer ((rows, bias) :: fst (snd rest)))
         (real_layer (snd (snd rest))) x' =
       layer_by_layer between (map real_layer ((m, b) :: hidden)) (real_layer last) x) as Paired.
-    { intros s rows bias E R HP V F. cbv zeta. cbn [fst snd map layer_by_layer hd tl real_layer]. rewrite R, <- E. fold y.
+    { intros s rows bias E R HP V F. cbv zeta. cbn [fst snd map layer_by_layer hd tl real_layer]. rewrite R, <- E.
+      fold y.
       cbn [activated].
       assert (exists u v, length u = length v /\ (length u + length v = length y)%nat
         /\ sort_layer s y = both Rmax u v ++ both Rmin u v
@@ -894,7 +903,8 @@ Proof.
   pose proof (passed_follow radius d (fst k) (snd k) s x D (L k (or_introl eq_refl)) X) as P.
   pose proof (passed_follow radius e (fst k) (snd k) s y E (L k (or_introl eq_refl)) Y) as G.
   assert (forall z, activated a z = whole a z) as M.
-  { intros z. rewrite (whole_activated a z z); auto. destruct a as [| | | | | | | |[k'| |]|]; try discriminate; exact A'. }
+  { intros z. rewrite (whole_activated a z z); auto. destruct a as [| | | | | | | |[k'| |]|]; try discriminate;
+    exact A'. }
   split.
   - cbn [related real_relation]. rewrite !whole_entrywise by auto. now apply (increments_in a _ _ _ d e).
   - apply IH; auto; [intros; apply L; now right| |]; rewrite <- M; now apply activated_known_follow.
@@ -912,7 +922,8 @@ Proof.
   apply (within_clamped (clamp p)) in X, Y.
   destruct (inputs_follow _ _ X) as (d & D & _ & F). destruct (inputs_follow _ _ Y) as (e & D' & _ & F').
   specialize (F O [] eq_refl). specialize (F' O [] eq_refl).
-  assert (along (fst (undivided_stack p)) (real_relations (map Each (ranges_on_box p b))) (clamped (clamp p) x) (clamped (clamp p) y))
+  assert (along (fst (undivided_stack p)) (real_relations (map Each (ranges_on_box p b))) (clamped (clamp p) x)
+    (clamped (clamp p) y))
     as A.
   { apply (centred_along _ d e); auto. intros k K. apply (fits_layer p k W). unfold layers. apply in_or_app. now left. }
   unfold local_relations, p in *. destruct f as [q|phi k]; cbn [stacks_of moved along_after] in *; rewrite !plus_nil_r.

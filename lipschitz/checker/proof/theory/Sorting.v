@@ -108,7 +108,8 @@ Lemma total_app u v : total (u ++ v) = total u + total v.
 Proof. induction u as [|a u IH]; simpl; [ring|]. rewrite IH. ring. Qed.
 Lemma total_inserted a l : total (insertedR a l) = a + total l.
 Proof.
-  revert a. induction l as [|b l IH]; intros a; simpl; auto. rewrite IH. unfold Rmin, Rmax. destruct (Rle_dec a b); ring.
+  revert a. induction l as [|b l IH]; intros a; simpl; auto. rewrite IH. unfold Rmin, Rmax.
+    destruct (Rle_dec a b); ring.
 Qed.
 Lemma total_ascending l : total (ascendingR l) = total l.
 Proof.
