@@ -220,7 +220,7 @@ class KerasReader {
   std::vector<std::string> notes_;
 };
 
-constexpr std::uint64_t kLargestEntry_bytes = std::uint64_t{1} << 29;
+constexpr std::uint64_t kLargestModel_bytes = std::uint64_t{1} << 29;
 
 }  // namespace
 
@@ -229,8 +229,8 @@ bool is_keras_archive(const ZipArchive& archive) {
 }
 
 Weights parse_keras_archive(const ZipArchive& archive, const std::string& path, const LayerChoice& choice) {
-  const std::string config = archive.read("config.json", kLargestEntry_bytes);
-  return KerasReader(archive.read("model.weights.h5", kLargestEntry_bytes), path, choice).run(config);
+  const std::string config = archive.read("config.json", kLargestModel_bytes);
+  return KerasReader(archive.read("model.weights.h5", kLargestModel_bytes), path, choice).run(config);
 }
 
 Weights parse_keras(const std::string& bytes, const std::string& path, const LayerChoice& choice) {
