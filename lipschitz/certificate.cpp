@@ -75,6 +75,7 @@ void describe_canonical_network(files::Keys& keys) {
     for (const char* const list : {"order", "phi_order", "rho_order", "select"})
       options.must<Texts>(list, "");
     options.must<std::string>("activation", "");
+    options.may<std::string>("normalization", "File of VecNormalize, from the folder of the weights; none.");
   });
   keys.must_table("output", "", [](files::Keys& output) {
     output.must<std::string>("quantity", "");

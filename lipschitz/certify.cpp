@@ -173,7 +173,7 @@ void multiply_norms(const Network& network, const files::Parts& parts,
     for (const files::Activation activation : parts.at(name)->activations()) {
       const files::ActivationFunction& function = files::function_of(activation);
       bound.has_slopes = bound.has_slopes && !function.sorts();
-      bound.is_monotone = bound.is_monotone && function.is_monotone();
+      bound.is_monotone = bound.is_monotone && function.is_monotone() && !function.sorts();
     }
     bound.has_local_slopes = bound.has_local_slopes || (bound.domain == "box" && !parts.at(name)->is_relu());
   }

@@ -60,9 +60,9 @@ struct CertifiedLayer {
 
 struct CertifiedBound : Claim {
   bool is_relu = true;     ///< all activations are ReLU; else no branch and bound without a box
-  bool has_slopes = true;  ///< activations act entry by entry; false: a layer sorts, product bound only
+  bool has_slopes = true;  ///< activations act entry by entry; false: a layer sorts, and no bound is of a box
   bool has_local_slopes = false;  ///< a box, and an activation other than ReLU: slopes may be smaller there
-  bool is_monotone = true;        ///< false: the layer-wise bound is the product of norms
+  bool is_monotone = true;        ///< false: some slope is negative, or a layer sorts; no layer-wise bound
   UpperBound upper{0};
   UpperMethod method = UpperMethod::kProduct;
   std::optional<UpperProof> proof;  ///< set if method is kEclipseFast, kSdp or kLocalSdp

@@ -25,7 +25,7 @@ std::string called(const CertifiedBound& bound) {
 }
 
 bool has_program(UpperMethod method, const CertifiedBound& bound) {
-  return method != UpperMethod::kProduct && bound.neighbours.empty() && bound.has_slopes;
+  return method != UpperMethod::kProduct && bound.neighbours.empty();
 }
 
 bool searches_boxes(const CertifyOptions& options) {
@@ -194,7 +194,7 @@ bool bound_by_slopes_on_box(const Network& network, const Box& box, const std::v
   const check::Intervals inputs = {{box.lower.begin(), box.lower.end()},
                                    {box.upper.begin(), box.upper.end()}};
   multiply_local_slopes(network, inputs, layers, bound);
-  if (!has_program(method, bound)) return false;
+  if (!has_program(method, bound) || !bound.has_slopes) return false;
   options.known = bound.upper;
   bound.sdp =
       bent_bound(check::chain_on_box(network, bound.function, bound.block, bound.scale, inputs), options);

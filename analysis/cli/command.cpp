@@ -76,6 +76,18 @@ void declare_activation(CLI::App& app, files::NetworkArguments& arguments) {
           files::activations() + ". " + kHalvesOrPairs + "; groupsort sorts upwards");
 }
 
+namespace {
+
+void declare_normalization(CLI::App& app, files::NetworkArguments& arguments) {
+  app.add_option(
+      "--normalization", arguments.normalization,
+      "File that VecNormalize.save() of Stable-Baselines3 wrote: inputs are observations before their "
+      "normalization; none: they are normalized. Default: vec_normalize.pkl beside a policy's .zip, if there "
+      "is one");
+}
+
+}  // namespace
+
 void declare_network(CLI::App& app, files::NetworkArguments& arguments) {
   auto* file =
       app.add_option("NET", arguments.file, "network.toml, or a weight file that holds one plain network");
@@ -88,6 +100,7 @@ void declare_network(CLI::App& app, files::NetworkArguments& arguments) {
   app.add_option("--key", arguments.key, "Key of the state dict inside a nested checkpoint, e.g. model");
   declare_activation(app, arguments);
   declare_order(app, arguments);
+  declare_normalization(app, arguments);
 }
 
 files::Network load_net(const files::NetworkArguments& arguments) {

@@ -5,18 +5,10 @@
 #include <vector>
 
 #include "lipschitz/base/box.h"
+#include "lipschitz/solver/node_inequality.h"
 #include "lipschitz/values/reach.h"
 
 namespace swarmcert::lipschitz {
-
-/// A pair of states that cannot occur together: s_1 y_1 > 0 and s_2 y_2 > 0 hold nowhere in the box at once, with s = 1
-/// for on and s = -1 for off, because lambda s_1 y_1 + (1 - lambda) s_2 y_2 < 0. Neurons are numbered over all outputs
-/// of hidden layers.
-struct NeuronPair {
-  Eigen::Index first = 0, second = 0;  ///< first < second
-  bool first_on = true, second_on = true;
-  double lambda = 0;
-};
 
 /// Linear upper bounds on y and -y of every neuron over a box.
 class NeuronForms {

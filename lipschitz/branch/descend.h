@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "lipschitz/branch/node_inequality.h"
+#include "lipschitz/solver/node_inequality.h"
 
 namespace swarmcert::lipschitz {
 

@@ -109,6 +109,23 @@ LocalChain local_chain(const ReachNetwork& layers, const MatrixXd& form, const s
   return chain;
 }
 
+std::vector<SlopeLayer> slope_layers(const LocalChain& chain, const std::vector<NeuronState>& states) {
+  std::vector<SlopeLayer> layers;
+  std::size_t neuron = 0;
+  for (const auto& hidden : chain.hidden) {
+    const Index rows = hidden.weights.rows();
+    layers.push_back({hidden.weights, Eigen::VectorXd::Zero(rows), Eigen::VectorXd::Zero(rows)});
+    for (Index i = 0; i < rows; ++i, ++neuron) {
+      layers.back().low(i) = states[neuron] == NeuronState::kOn ? 1 : 0;
+      layers.back().width(i) = states[neuron] == NeuronState::kUndecided ? 1 : 0;
+    }
+  }
+  MatrixXd& first = layers.front().weights;
+  first = MatrixXd(first(Eigen::all, chain.block));
+  for (Index k = 0; k < first.cols(); ++k) first.col(k) *= chain.weight[static_cast<std::size_t>(k)];
+  return layers;
+}
+
 SetChain set_chain(const LocalChain& whole, std::size_t last) {
   SetChain set{whole, whole, whole, whole.hidden.at(last).weights};
   const auto cut = static_cast<std::ptrdiff_t>(last);

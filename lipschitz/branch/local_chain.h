@@ -10,6 +10,9 @@
 
 namespace swarmcert::lipschitz {
 
+/// State of a neuron over a box.
+enum class NeuronState : char { kOff, kOn, kUndecided };
+
 /// The function f = g(h_K-1) with hidden layers h_k = relu(W_k h_k-1 + b_k), or h_k = W_k h_k-1 + b_k for a layer
 /// without ReLU, and |g(z) - g(z')|^2 <= (z - z')' G (z - z') for all z, z'. For a plain network G = W_K' W_K; for phi
 /// in front of rho, G contains a bound on rho (RhoForm).
@@ -47,6 +50,9 @@ struct LocalChain {
 /// @param form   the Gram matrix of the function behind the last layer, [outputs x outputs]; empty: the identity.
 LocalChain local_chain(const ReachNetwork& layers, const Eigen::MatrixXd& form, const std::vector<int>& block,
                        const std::vector<double>& weight);
+
+/// Returns the hidden layers on the moving inputs: a neuron that is off has dz = 0, one that is on has dz = dy.
+std::vector<SlopeLayer> slope_layers(const LocalChain& chain, const std::vector<NeuronState>& states);
 
 /// The chain of a set function, split at the last layer of phi, v = W h + b, which has no ReLU: the hidden layers of
 /// phi, whose `gram` is set later from a form Q with |drho|^2 <= dv' Q dv, and rho as a function of v. All parts are in

@@ -6,7 +6,7 @@
 
 #include "lipschitz/base/stop.h"
 #include "lipschitz/branch/local_chain.h"
-#include "lipschitz/branch/node_inequality.h"
+#include "lipschitz/solver/node_inequality.h"
 
 namespace swarmcert::lipschitz {
 

@@ -12,8 +12,8 @@
 
 #include "lipschitz/branch/branch.h"
 #include "lipschitz/branch/descend.h"
-#include "lipschitz/branch/node_inequality.h"
 #include "lipschitz/branch/search_tree.h"
+#include "lipschitz/solver/node_inequality.h"
 
 namespace swarmcert::lipschitz {
 

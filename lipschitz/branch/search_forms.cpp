@@ -38,7 +38,7 @@ void BranchSearch::renew_form(Part& part) const {
   std::vector<NeuronState> states = part.states;
   states.insert(states.end(), static_cast<std::size_t>(set_->last.rows()), NeuronState::kOn);
   states.insert(states.end(), behind.begin(), behind.end());
-  const NodeInequality joint(set_->whole, states);
+  const NodeInequality joint(slope_layers(set_->whole, states), set_->whole.gram);
   const Index m = undecided_in(part.states);
   VectorXd t;
   if (old == nullptr) {
@@ -52,13 +52,13 @@ void BranchSearch::renew_form(Part& part) const {
     t = descend(joint, all(joint.undecided()), descent);
   }
   t = t.cast<float>().cast<double>();
-  const NodeInequality rho(set_->rho, behind);
+  const NodeInequality rho(slope_layers(set_->rho, behind), set_->rho.gram);
   MatrixXd q = rho.least_form(t.tail(t.size() - m));
   if (q.size() == 0) return;
   q.diagonal().array() += kFormMargin * q.diagonal().maxCoeff();
   q = MatrixXd(q.cast<float>().cast<double>().selfadjointView<Eigen::Lower>());
   own.gram = set_->gram(q);
-  const double least = NodeInequality(chain_, part.states, own.gram).least_rho(t.head(m));
+  const double least = NodeInequality(slope_layers(chain_, part.states), own.gram).least_rho(t.head(m));
   if (!(least < part.rho)) return;
   part.undecided_then = least < kFar * part.rho ? std::numeric_limits<int>::max() : part.undecided;
   part.rho = least;

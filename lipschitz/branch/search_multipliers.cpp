@@ -43,7 +43,7 @@ VectorXd BranchSearch::inherited(const Part& part, const std::vector<std::size_t
 
 std::vector<NeuronPair> BranchSearch::chosen_pairs(const Part& part, std::size_t most, VectorXd& t) const {
   if (most == 0 && part.multipliers->pairs.empty()) {
-    NodeInequality inequality(chain_, part.states, gram_of(part));
+    NodeInequality inequality(slope_layers(chain_, part.states), gram_of(part));
     t = inherited(part, {}, inequality);
     return {};
   }
@@ -52,7 +52,7 @@ std::vector<NeuronPair> BranchSearch::chosen_pairs(const Part& part, std::size_t
   const Reach again(chain_.hidden, part.reach->box(), part.around.get(), nullptr, &found,
                     options_.better_slopes ? &same_as_before : nullptr);
   const NeuronForms forms(found, part.reach->box());
-  NodeInequality inequality(chain_, part.states, gram_of(part));
+  NodeInequality inequality(slope_layers(chain_, part.states), gram_of(part));
   const std::vector<std::size_t> old = still_shown(part, forms);
   t = inherited(part, old, inequality);
   std::vector<NeuronPair> result;
@@ -96,7 +96,7 @@ void BranchSearch::solve(Part& part) const {
 }
 
 void BranchSearch::solve(Part& part, const DescentOptions& descent, std::size_t most_pairs) const {
-  NodeInequality inequality(chain_, part.states, gram_of(part));
+  NodeInequality inequality(slope_layers(chain_, part.states), gram_of(part));
   const Index m = inequality.neurons();
   std::vector<NeuronPair> pairs;
   VectorXd t;
@@ -108,7 +108,7 @@ void BranchSearch::solve(Part& part, const DescentOptions& descent, std::size_t 
     t = descend(inequality, t, descent);
     if (!std::isfinite(inequality.least_rho(t)) && !pairs.empty()) {
       pairs.clear();
-      inequality = NodeInequality(chain_, part.states, gram_of(part));
+      inequality = NodeInequality(slope_layers(chain_, part.states), gram_of(part));
       t = root_multipliers(chain_, inequality, options_.start, Stop(options_.cancelled));
     }
   }

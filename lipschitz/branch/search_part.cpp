@@ -48,7 +48,7 @@ BranchSearch::Part BranchSearch::part(const Box& box, const Part* parent) const 
     if (has_pairs) pairs = still_shown(part, NeuronForms(forms, box));
     const bool all_pairs = !has_pairs || pairs.size() == part.multipliers->pairs.size();
     if (part.multipliers && (part.states != parent->states || !all_pairs)) {
-      NodeInequality inequality(chain_, part.states, gram_of(part));
+      NodeInequality inequality(slope_layers(chain_, part.states), gram_of(part));
       const double rho = inequality.least_rho(inherited(part, pairs, inequality));
       const bool is_worse = !all_pairs && !(rho <= part.rho);  // because a pair is missing
       part.rho = is_worse ? rho : std::min(part.rho, rho);

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <filesystem>
 #include <stdexcept>
 
 #include "lipschitz/checker/canonical_network.h"
@@ -33,7 +34,7 @@ void check_upper(const BentChain& chain, const files::Json& proof, double upper,
   files::require_keys(proof, {"rho", "t", "factor"}, where + ".proof");
   const Dyadic rho = files::parse_hex_float(proof["rho"].get<std::string>());
   const std::vector<double> t = files::parse_hex_floats(proof["t"]);
-  require(t.size() == hidden_neurons(chain.stages), where + ": needs one multiplier t per hidden neuron");
+  require(t.size() == chain.multipliers(), where + ": needs one multiplier t per hidden neuron");
   require(rho.sign() > 0 && std::all_of(t.begin(), t.end(), [](double x) { return x >= 0; }),
           where + ": rho is not positive, or a t negative");
   require(Dyadic(upper) * upper >= rho, where + ": claims less than sqrt(rho)");
@@ -236,9 +237,9 @@ void CertificateChecker::check_activations(const Json& bound, const std::vector<
       if (activation == files::Activation::kRelu) continue;
       const files::ActivationFunction& function = files::function_of(activation);
       const std::string with = " of a network with " + function.words;
-      require(
-          !function.sorts() || bound["upper_method"] == "product" || bound["upper_method"] == "local_product",
-          where + ": a bound from slopes of single numbers" + with);
+      const Json& method = bound["upper_method"];
+      require(!function.sorts() || method == "product" || method == "local_product" || method == "sdp",
+              where + ": a bound from slopes of single numbers" + with);
     }
   }
 }
@@ -354,6 +355,11 @@ files::NetworkArguments with_stated_options(const files::Json& certificate,
   }
   if (arguments.key.empty() && arguments.file.find('#') == std::string::npos) arguments.key = stated.key;
   if (arguments.activation.empty()) arguments.activation = stated.activation;
+  if (arguments.normalization.empty() && !stated.normalization.empty()) {
+    const std::filesystem::path folder = std::filesystem::path(arguments.file).parent_path();
+    const bool is_none = stated.normalization == "none";
+    arguments.normalization = is_none ? stated.normalization : (folder / stated.normalization).string();
+  }
   return arguments;
 }
 

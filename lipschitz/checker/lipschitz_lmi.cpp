@@ -174,9 +174,64 @@ bool BentChain::is_bent() const {
   });
 }
 
-SymmetricMatrix lipschitz_lmi(const BentChain& chain, const Dyadic& rho, const std::vector<Dyadic>& t) {
-  if (chain.slopes.size() != hidden_neurons(chain.stages))
+std::size_t BentChain::multipliers() const {
+  if (groups.empty()) return slopes.size();
+  std::size_t count = 0;
+  for (std::size_t k = 0; k < groups.size(); ++k)
+    count += static_cast<std::size_t>(groups[k] == 1 ? stages[k].rows : 2 * (stages[k].rows / groups[k]));
+  return count;
+}
+
+namespace {
+
+/// The multipliers of a chain, by neuron, and those of the sums of groups, by layer.
+struct Multipliers {
+  std::vector<Dyadic> own;
+  std::vector<std::vector<Dyadic>> sums;
+};
+
+Multipliers spread(const BentChain& chain, const std::vector<Dyadic>& t) {
+  if (chain.slopes.size() != hidden_neurons(chain.stages) || t.size() != chain.multipliers())
     throw std::invalid_argument("lipschitz_lmi: there is not one range of slopes per hidden neuron");
+  if (chain.groups.empty()) return {t, {}};
+  Multipliers result;
+  auto next = t.begin();
+  for (std::size_t k = 0; k < chain.groups.size(); ++k) {
+    const int rows = chain.stages[k].rows, group = chain.groups[k];
+    if (rows % group != 0) throw std::invalid_argument("lipschitz_lmi: a layer is no multiple of its group");
+    for (int i = 0; i < rows; ++i) result.own.push_back(next[i / group]);
+    next += rows / group;
+    const auto past = group == 1 ? next : next + rows / group;
+    result.sums.emplace_back(next, past);
+    next = past;
+  }
+  return result;
+}
+
+/// Returns the matrix of the squares of the sums of a layer's groups, of what enters less of what leaves them, over the
+/// variables that enter and those that leave the layer.
+Matrix squares_of_sums(const Matrix& m, int group, const std::vector<Dyadic>& t) {
+  const int groups = static_cast<int>(t.size());
+  Matrix rows(groups, m.cols + m.rows);
+  for (int i = 0; i < m.rows; ++i) {
+    for (int j = 0; j < m.cols; ++j) rows(i / group, j) += m(i, j);
+    rows(i / group, m.cols + i) = -1.0;
+  }
+  Matrix weighted = rows;
+  for (int g = 0; g < groups; ++g)
+    for (int j = 0; j < rows.cols; ++j) weighted(g, j) = t[static_cast<std::size_t>(g)] * rows(g, j);
+  return product(transposed(rows), weighted);
+}
+
+void add_block(const Matrix& block, int at, Matrix& p) {
+  for (int i = 0; i < block.rows; ++i)
+    for (int j = 0; j < block.cols; ++j) p(at + i, at + j) += block(i, j);
+}
+
+}  // namespace
+
+SymmetricMatrix lipschitz_lmi(const BentChain& chain, const Dyadic& rho, const std::vector<Dyadic>& stated) {
+  const auto [t, sums] = spread(chain, stated);
   if (!chain.is_bent()) return lipschitz_lmi(chain.stages, rho, t);
   Matrix q(chain.stages.front().cols, chain.stages.front().cols);
   for (int i = 0; i < q.rows; ++i) q(i, i) = rho;
@@ -196,9 +251,8 @@ SymmetricMatrix lipschitz_lmi(const BentChain& chain, const Dyadic& rho, const s
       const Dyadic factor = Dyadic(2.0) * chain.slopes[next].low * chain.slopes[next].high * t[next];
       for (int j = 0; j < m.cols; ++j) bent(i, j) = factor * m(i, j);
     }
-    const Matrix square = product(transposed(m), bent);
-    for (int i = 0; i < m.cols; ++i)
-      for (int j = 0; j < m.cols; ++j) p(before + i, before + j) += square(i, j);
+    add_block(product(transposed(m), bent), before, p);
+    if (!sums.empty() && !sums[k].empty()) add_block(squares_of_sums(m, chain.groups[k], sums[k]), before, p);
     before += m.cols;
   }
   return p;

@@ -74,17 +74,26 @@ struct SlopeRange {
 /// A chain M_1 .. M_K with one slope range per hidden neuron, first layer first.
 struct BentChain {
   std::vector<Matrix> stages;
-  std::vector<SlopeRange> slopes;
+  std::vector<SlopeRange> slopes;  ///< [-1, 1] in layers of groups
+  /// Size of the groups of adjacent numbers in each hidden layer, 1 where each number is by itself. A group comes no
+  /// further apart than what enters it, and keeps its sum, as sorting does. Empty: all 1.
+  std::vector<int> groups = {};
 
   bool is_bent() const;  ///< whether any range differs from [0, 1]
+  /// Returns the number of multipliers t: one per neuron that is by itself; of each layer of groups one per group for
+  /// its distance, then one per group for its sum.
+  std::size_t multipliers() const;
 };
 
 /// lipschitz_lmi() of such a chain. Slopes in [a, b] give (dz - a dy) (b dy - dz) >= 0 for each neuron, that is
 /// dz ((a + b) dy - dz) - a b dy^2 >= 0. If all ranges are [0, 1], this is the matrix above. Otherwise no variable is
 /// eliminated: the matrix over (dx, dz_1, ..., dz_{K-1}) is quadratic_lmi() with Q = rho I, in which each row m' of a
 /// hidden stage is multiplied by a + b, and 2 t a b m m' is added for each neuron, in the diagonal block of the
-/// variables on which m' acts.
-/// @throws std::invalid_argument if there is not one range per hidden neuron.
+/// variables on which m' acts. In a group |dz|^2 <= |dy|^2: its neurons share t, and a = -1, b = 1. Its sum gives
+/// 1'(dy - dz) = 0, so that any multiple of the square of this may be added (P. Pauli et al., "Novel quadratic
+/// constraints for extending LipSDP beyond slope-restricted activations", 2024).
+/// @param t multipliers() of them.
+/// @throws std::invalid_argument if there is not one range per hidden neuron, or a layer is no multiple of its group.
 SymmetricMatrix lipschitz_lmi(const BentChain& chain, const Dyadic& rho, const std::vector<Dyadic>& t);
 
 /// Returns the symmetric matrix whose positive semidefiniteness proves |g(v) - g(w)|^2 <= (v - w)' Q (v - w) for a

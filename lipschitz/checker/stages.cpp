@@ -24,19 +24,47 @@ Matrix selected_columns(const Matrix& w, const std::vector<int>& inputs, const s
   return result;
 }
 
-/// The divisor of an activation, and the slope range of the quotient: [0, 1] or [1 - c, c].
+/// The divisor of an activation, and the slope range of the quotient: [0, 1], [1 - c, c], or [-1, 1] of groups.
 struct Unit {
   Dyadic slope;
   SlopeRange range;
 };
 
 Unit unit_of(const files::ActivationFunction& function) {
-  if (function.sorts())
-    throw std::domain_error(function.words + " acts on whole layers and has no entrywise slopes");
+  if (function.sorts()) return {1.0, {-1.0, 1.0}};
   if (function.is_monotone()) return {function.greatest_slope, {0.0, 1.0}};
   if (function.least_slope != 1 - function.greatest_slope)
     throw std::logic_error(function.op + ": slopes that do not add up to 1");
   return {1.0, {function.least_slope, function.greatest_slope}};
+}
+
+/// MaxMin sorts groups of two whose numbers are not adjacent. Returns the place of each number of a layer of `size`
+/// where they are: of what enters it, or of what leaves it.
+std::vector<int> places(files::Activation activation, int size, bool enters) {
+  std::vector<int> result(static_cast<std::size_t>(size));
+  const bool is_halves = activation == files::Activation::kMaxMinHalves;
+  const bool is_turned = is_halves || activation == files::Activation::kMaxMinPairs;
+  for (int i = 0, h = size / 2; i < size; ++i)
+    result[static_cast<std::size_t>(i)] = !is_turned || (enters && !is_halves) ? i
+                                          : enters                             ? 2 * (i % h) + i / h
+                                                                               : 2 * (i % h) + 1 - i / h;
+  return result;
+}
+
+/// Puts the rows of a layer, and its columns, to where the groups that they enter, and leave, are adjacent.
+Matrix with_adjacent_groups(const files::Weights& weights, std::size_t k) {
+  const files::Layer& layer = weights.layers[k];
+  const Matrix w(layer.outputs, layer.inputs, layer.weights);
+  const bool is_last = k + 1 == weights.layers.size();
+  const std::vector<int> rows =
+      places(is_last ? files::Activation::kRelu : layer.activation, layer.outputs, true);
+  const std::vector<int> columns =
+      places(k == 0 ? files::Activation::kRelu : weights.layers[k - 1].activation, layer.inputs, false);
+  Matrix result = w;
+  for (int i = 0; i < w.rows; ++i)
+    for (int j = 0; j < w.cols; ++j)
+      result(rows[static_cast<std::size_t>(i)], columns[static_cast<std::size_t>(j)]) = w(i, j);
+  return result;
 }
 
 /// Returns the factor of the activation of layer k.
@@ -59,8 +87,7 @@ std::vector<Matrix> chained(const files::Network& network, const files::Function
   for (const files::FunctionId& name : names) {
     const files::Weights& weights = *parts.at(name);
     for (std::size_t k = 0; k < weights.layers.size(); ++k) {
-      const files::Layer& layer = weights.layers[k];
-      Matrix w(layer.outputs, layer.inputs, layer.weights);
+      Matrix w = with_adjacent_groups(weights, k);
       if (chain.empty()) {  // the first layer acts on the inputs, the first of rho on the last of phi
         chain.push_back(selected_columns(w, coordinates, scale));
       } else if (k == 0) {
@@ -101,9 +128,11 @@ BentChain bent_chain(const files::Network& network, const files::FunctionId& fun
   const files::Parts parts = files::parts(network);
   for (const files::FunctionId& name : function.parts()) {
     const files::Weights& weights = *parts.at(name);
-    for (std::size_t k = 0; k + 1 < weights.layers.size(); ++k)
+    for (std::size_t k = 0; k + 1 < weights.layers.size(); ++k) {
       result.slopes.insert(result.slopes.end(), static_cast<std::size_t>(weights.layers[k].outputs),
                            unit_of(function_after(weights, k)).range);
+      result.groups.push_back(function_after(weights, k).group);
+    }
   }
   return result;
 }
@@ -118,7 +147,8 @@ BentChain chain_on_box(const files::Network& network, const files::FunctionId& f
   const std::vector<files::FunctionId> names = function.parts();
   for (const files::FunctionId& name : names)
     for (std::size_t k = 0; k + 1 < parts.at(name)->layers.size(); ++k)
-      unit_of(function_after(*parts.at(name), k));  // throws if it sorts
+      if (function_after(*parts.at(name), k).sorts())
+        throw std::domain_error(name.name() + " sorts a layer, which has no entrywise slopes");
   for (const std::vector<Interval>& layer : slopes_on_box(*parts.at(names.front()), box))
     for (const Interval& slopes : layer) result.slopes.push_back({slopes.lower, slopes.upper});
   if (names.size() == 1) return result;

@@ -27,8 +27,9 @@ namespace swarmcert::check {
 std::vector<Matrix> stages(const files::Network& network, const files::FunctionId& function,
                            const std::string& block = "all", const std::vector<double>& scale = {});
 
-/// The same for any activations that act entry by entry, with the slope range of each hidden neuron: [0, 1] after
-/// division by the largest slope, or [1 - c, c] with c > 1, which is not divided.
+/// The same for any activations, with the slope range of each hidden neuron: [0, 1] after division by the largest
+/// slope, or [1 - c, c] with c > 1, which is not divided; or with groups where a layer is sorted, adjacent ones: rows
+/// and columns that MaxMin compares across the layer change places.
 /// @throws as stages(), except that activations need not be monotone.
 BentChain bent_chain(const files::Network& network, const files::FunctionId& function,
                      const std::string& block = "all", const std::vector<double>& scale = {});

@@ -160,6 +160,39 @@ void add_divided(MatrixXd& c, MatrixXd a, const SlackFactor& s, const MatrixXd& 
   c += a;
 }
 
+/// Sums over the multipliers that are tied, and the way back.
+class Ties {
+ public:
+  explicit Ties(const RankTwoInequality& inequality) : of_(inequality.ties()) {}
+
+  VectorXd summed(VectorXd v) const {
+    if (of_.empty()) return v;
+    VectorXd result = VectorXd::Zero(2 + of_.back());
+    result(0) = v(0);
+    for (std::size_t i = 0; i < of_.size(); ++i) result(1 + of_[i]) += v(1 + static_cast<Index>(i));
+    return result;
+  }
+  MatrixXd summed(MatrixXd m) const {
+    if (of_.empty()) return m;
+    MatrixXd rows(2 + of_.back(), m.cols());
+    for (Index j = 0; j < m.cols(); ++j) rows.col(j) = summed(VectorXd(m.col(j)));
+    MatrixXd result(rows.rows(), rows.rows());
+    for (Index i = 0; i < rows.rows(); ++i)
+      result.row(i) = summed(VectorXd(rows.row(i).transpose())).transpose();
+    return result;
+  }
+  VectorXd spread(VectorXd y) const {
+    if (of_.empty()) return y;
+    VectorXd result(1 + static_cast<Index>(of_.size()));
+    result(0) = y(0);
+    for (std::size_t i = 0; i < of_.size(); ++i) result(1 + static_cast<Index>(i)) = y(1 + of_[i]);
+    return result;
+  }
+
+ private:
+  const std::vector<Index> of_;
+};
+
 /// Mehrotra's predictor-corrector method with the direction of Helmberg, Rendl, Vanderbei and Wolkowicz.
 class Minimisation {
  public:
@@ -169,6 +202,7 @@ class Minimisation {
         options_(options),
         size_(static_cast<double>(inequality.size())),
         block_begin_(inequality.slack_blocks()),
+        ties_(inequality),
         b_(VectorXd::Unit(1 + inequality.neurons(), 0)),
         y_(start),
         s_(inequality.slack(start)) {}
@@ -230,7 +264,8 @@ class Minimisation {
     if (point->gap < options_.relative_gap && point->infeasibility < options_.infeasibility)
       return ends(LipSdpStop::kGapReached);
     if (has_to_stop()) return false;
-    const SchurSolver schur(schur_complement(it_, z_, point->z_a, point->s_inverse, point->y_a));
+    const SchurSolver schur(
+        ties_.summed(schur_complement(it_, z_, point->z_a, point->s_inverse, point->y_a)));
     if (!schur.good()) return ends(LipSdpStop::kNumericalLimit);
 
     const Direction predictor = direction(schur, -b_, -z_, nullptr, *point);
@@ -258,7 +293,7 @@ class Minimisation {
     if (has_to_stop()) return std::nullopt;
     point.z_a = it_.times_a(z_);
     point.y_a = it_.times_a(point.s_inverse);
-    point.infeasibility = (b_ - functionals(it_, z_, point.z_a)).cwiseAbs().maxCoeff();
+    point.infeasibility = ties_.summed(VectorXd(b_ - functionals(it_, z_, point.z_a))).cwiseAbs().maxCoeff();
     point.mu = z_.cwiseProduct(s_).sum() / size_;
     point.gap = size_ * point.mu / y_(0);
     return point;
@@ -272,7 +307,7 @@ class Minimisation {
   /// Computes dy from the Schur complement, then dS and dZ: dZ = `target` - (Z dS + `q`) S^-1, symmetrised.
   Direction direction(const SchurSolver& schur, const VectorXd& rhs, MatrixXd target, const MatrixXd* q,
                       const Point& point) {
-    Direction found{schur.solve(rhs), {}, std::move(target)};
+    Direction found{ties_.spread(schur.solve(ties_.summed(rhs))), {}, std::move(target)};
     found.ds = it_.linear(found.dy);
     MatrixXd divided = it_.times_patterned(-z_, found.ds);
     if (q) divided -= *q;
@@ -327,6 +362,7 @@ class Minimisation {
   const InteriorPointOptions& options_;
   const double size_;
   const std::vector<Index> block_begin_;
+  const Ties ties_;
   const VectorXd b_;
   VectorXd y_;
   MatrixXd s_, z_, z_factor_;

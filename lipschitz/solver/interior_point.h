@@ -34,6 +34,8 @@ class RankTwoInequality {
   virtual Eigen::MatrixXd a_transposed_times(const Eigen::MatrixXd& x) const = 0;
   /// Returns X D for D with the sparsity pattern of S.
   virtual Eigen::MatrixXd times_patterned(const Eigen::MatrixXd& x, const Eigen::MatrixXd& d) const = 0;
+  /// Returns for each neuron, ascending from 0, the multiplier that it shares with others; empty: each has its own.
+  virtual std::vector<Eigen::Index> ties() const { return {}; }
 };
 
 struct InteriorPointOptions {
@@ -71,7 +73,8 @@ struct InteriorPointResult {
 /// Uses the HKM direction with Mehrotra's predictor-corrector (Helmberg et al. 1996; Kojima et al. 1997; Monteiro
 /// 1997). Each constraint matrix has rank two, so the Schur complement costs a few products of n x n matrices instead
 /// of one per pair of constraints. S is recomputed from y in each iteration, so every iterate is feasible.
-/// @param start strictly feasible, S(start) > 0; progress is slow if it is close to the boundary.
+/// Ties are equations between the y_i: the system of each step is summed over them.
+/// @param start strictly feasible, S(start) > 0, and equal where tied; progress is slow if it is close to the boundary.
 /// @returns floating-point estimates without a guarantee: verify them.
 InteriorPointResult minimise(const RankTwoInequality& inequality, const Eigen::VectorXd& start,
                              const InteriorPointOptions& options);

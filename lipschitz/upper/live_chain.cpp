@@ -12,12 +12,12 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 
 /// Returns per hidden layer the neurons that depend on the input and reach the output.
-std::vector<std::vector<Index>> live_neurons(const ReluChain& chain) {
+std::vector<std::vector<Index>> live_neurons(const ReluChain& chain, bool keeps_all) {
   std::vector<std::vector<Index>> live(chain.size() - 1);
   for (std::size_t k = 0; k < live.size(); ++k) {
     for (Index i = 0; i < chain[k].rows(); ++i) live[k].push_back(i);
   }
-  for (bool changed = true; changed;) {
+  for (bool changed = !keeps_all; changed;) {
     changed = false;
     for (std::size_t k = 0; k < live.size(); ++k) {
       const auto is_dead = [&](Index i) {
@@ -73,8 +73,10 @@ ReluChain rounded(const std::vector<check::Matrix>& stages) {
   return chain;
 }
 
-LiveChain::LiveChain(const std::vector<check::Matrix>& stages)
-    : chain_(rounded(stages)), neurons_(live_neurons(chain_)), live_(restricted(chain_, neurons_)) {}
+LiveChain::LiveChain(const std::vector<check::Matrix>& stages, bool keeps_all)
+    : chain_(rounded(stages)),
+      neurons_(live_neurons(chain_, keeps_all)),
+      live_(restricted(chain_, neurons_)) {}
 
 std::vector<double> LiveChain::multipliers(const Eigen::VectorXd& t) const {
   std::vector<std::vector<double>> layers(neurons_.size());

@@ -15,7 +15,8 @@ ReluChain rounded(const std::vector<check::Matrix>& stages);
 /// The live part of a chain, for which multipliers are searched, and the conversion to multipliers of the whole chain.
 class LiveChain {
  public:
-  explicit LiveChain(const std::vector<check::Matrix>& stages);
+  /// @param keeps_all all neurons count as live.
+  explicit LiveChain(const std::vector<check::Matrix>& stages, bool keeps_all = false);
 
   /// Returns the chain of live neurons; the whole chain if there are no hidden layers.
   const ReluChain& live() const { return live_; }

@@ -4,6 +4,7 @@
 #include <cctype>
 #include <charconv>
 #include <cmath>
+#include <functional>
 #include <map>
 #include <optional>
 #include <stdexcept>
@@ -170,6 +171,14 @@ std::string activation_misfit(const Weights& weights, const std::string& text) {
 
 namespace {
 
+/// Returns the names as a list, or the only name that is in it.
+std::string once_if_alike(const std::vector<std::string>& names) {
+  std::string text = names.front();
+  if (std::adjacent_find(names.begin(), names.end(), std::not_equal_to<>()) == names.end()) return text;
+  for (std::size_t k = 1; k < names.size(); ++k) text += "," + names[k];
+  return text;
+}
+
 /// Applies one name for each layer but the last, or one more.
 Weights applied(Weights weights, const std::vector<std::string>& names, ActivationSource source) {
   std::vector<ActivationTerms> between;
@@ -179,6 +188,12 @@ Weights applied(Weights weights, const std::vector<std::string>& names, Activati
     between.push_back(*terms);
   }
   weights.activation_source = source;
+  const bool states_end = names.size() == weights.layers.size();
+  const auto is_settled = [states_end](const std::string& guess) {
+    return guess.rfind(kBetweenGuess, 0) == 0 || (states_end && guess.rfind(kEndGuess, 0) == 0);
+  };
+  std::vector<std::string>& assumed = weights.assumed;
+  assumed.erase(std::remove_if(assumed.begin(), assumed.end(), is_settled), assumed.end());
   const std::vector<Layer> stored = weights.layers;
   if (between.size() == weights.layers.size() && between.back().is_linear()) between.pop_back();
   if (between.size() == weights.layers.size()) {
@@ -190,8 +205,7 @@ Weights applied(Weights weights, const std::vector<std::string>& names, Activati
   weights.set_activations(functions);
   const auto is_itself = [](const ActivationTerms& terms) { return terms.is_s_itself(); };
   if (std::all_of(between.begin(), between.end(), is_itself)) return weights;
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ",") + name;
+  const std::string text = once_if_alike(names);
   try {
     weights.layers = rewritten(weights, between);
   } catch (const FoldingLimit& limit) {
@@ -236,14 +250,10 @@ Weights with_activation(Weights weights, const std::string& text) {
 Weights with_activation_of_file(Weights weights, const std::vector<std::string>& words,
                                 const std::string& field) {
   std::vector<std::string> names;
-  std::string text;
-  for (const std::string& word : words) {
-    names.push_back(known_name(word));
-    text += (text.empty() ? "" : ",") + word;
-  }
+  for (const std::string& word : words) names.push_back(known_name(word));
   names = spread(weights, names);
   const auto refuse = [&](const std::string& what) {
-    throw InputError({weights.path, "", field, in_quotes(text), what,
+    throw InputError({weights.path, "", field, in_quotes(once_if_alike(words)), what,
                       "save the matrices alone, and state what is between them with --activation"});
   };
   for (const std::string& name : names)

@@ -8,6 +8,10 @@
 
 namespace swarmcert::files {
 
+/// Beginnings of guesses in Weights::assumed that are settled where the activations are stated: what is between the
+/// layers, and what follows the last one, for which one more activation must be stated.
+inline constexpr char kBetweenGuess[] = "between the layers: ", kEndGuess[] = "behind the last layer: ";
+
 /// Returns the list of activations that with_activation() supports, for help and messages.
 std::string activations();
 
@@ -25,7 +29,7 @@ std::string activation_misfit(const Weights& weights, const std::string& text);
 /// layer. For a network of one layer, a single name has no effect. Smooth activations (activation_function.h) are kept;
 /// piecewise linear ones are rewritten with ReLU as the same function:
 /// leaky_relu(x) = relu(x) - a relu(-x), relu6(x) = relu(x) - relu(x - 6),
-/// hardtanh(x) = -1 + relu(x + 1) - relu(x - 1).
+/// hardtanh(x) = -1 + relu(x + 1) - relu(x - 1). Guesses that the names settle are removed from `assumed`.
 /// @throws InputError if the file itself or network.toml states other activations, the number of names does not match
 ///   the layers, the width of a layer is not a multiple of the group size, or the network becomes too large.
 /// @throws std::invalid_argument if a name is unknown.

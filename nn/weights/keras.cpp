@@ -21,6 +21,7 @@ class KerasReader {
   KerasReader(const std::string& bytes, const std::string& path, const LayerChoice& choice)
       : root_(hdf5_root(bytes, path)), path_(path), choice_(choice) {}
 
+  /// A model in one HDF5 file: groups of layers by their names, and the configuration as an attribute.
   Weights run() {
     const Hdf5Object group = root_.has("model_weights") ? root_.open("model_weights") : root_;
     const auto layers = group.texts("layer_names");
@@ -29,7 +30,38 @@ class KerasReader {
              "write W1, b1, W2, b2, ... [outputs x inputs] with numpy.savez");
     const auto config = root_.texts("model_config");
     if (config && !config->empty()) read_config(config->front());
-    for (const std::string& layer : *layers) read_layer(group, layer);
+    for (const std::string& layer : *layers) {
+      const Hdf5Object own = group.open(layer);
+      for (const std::string& weight : own.texts("weight_names").value_or(std::vector<std::string>())) {
+        const std::string part = weight.substr(weight.rfind('/') + 1);  // npos + 1 is 0
+        read_tensor(own.open(weight), layer, part.substr(0, part.find(':')));
+      }
+    }
+    return assembled();
+  }
+
+  /// A model of a .keras archive, whose HDF5 file numbers the layers of each class in the order of the configuration:
+  /// layers/dense, layers/dense_1, ..., each with vars/0, the kernel, and vars/1, the bias.
+  Weights run(const std::string& config) {
+    read_config(config);
+    const Hdf5Object group = root_.open(root_.has("layers") ? "layers" : "_layer_checkpoint_dependencies");
+    for (std::size_t k = 0; k < stages_.size(); ++k) {
+      const Hdf5Object vars = group.open("dense" + (k == 0 ? "" : "_" + std::to_string(k)) + "/vars");
+      for (const std::string& name : vars.links()) {
+        if (name != "0" && name != "1")
+          refuse(in_quotes(stages_[k].layer), name, "has more than a kernel and a bias");
+        read_tensor(vars.open(name), stages_[k].layer, name == "0" ? "kernel" : "bias");
+        if (name == "0" && declared_.back().shape[0] != stages_[k].units)
+          refuse(in_quotes(stages_[k].layer), shape_text(declared_.back().shape),
+                 "does not have the " + std::to_string(stages_[k].units) + " outputs of the configuration",
+                 kCopyAgain);
+      }
+    }
+    return assembled();
+  }
+
+ private:
+  Weights assembled() {
     const TensorReader read = [this](std::size_t i) { return numbers_[i]; };
     Weights weights =
         assemble(declared_, read, path_, is_stated_ ? Listing::kEvaluation : Listing::kRegistration, choice_);
@@ -40,7 +72,6 @@ class KerasReader {
     return with_activation_of_file(std::move(weights), activations, "model_config");
   }
 
- private:
   [[noreturn]] void refuse(const std::string& field, const std::string& value, const std::string& what,
                            const std::string& hint = kExportOnnx) const {
     throw InputError({path_, "", field, value, what, hint});
@@ -48,14 +79,18 @@ class KerasReader {
 
   struct Stage {
     std::string layer, activation;
+    std::uint64_t units = 0;
   };
 
   static std::string text(const Json& json, const char* key) {
     return json.is_object() && json.contains(key) && json[key].is_string() ? json[key].get<std::string>()
                                                                            : "";
   }
-  static double number(const Json& json, const char* key, double otherwise) {
-    return json.contains(key) && json[key].is_number() ? json[key].get<double>() : otherwise;
+  double number(const Json& json, const char* key, double otherwise) const {
+    if (!json.contains(key) || json[key].is_null()) return otherwise;
+    if (!json[key].is_number())
+      refuse("model_config", in_quotes(text(json, "name")), "has no number as its " + std::string(key));
+    return json[key].get<double>();
   }
 
   /// Reads the layers of a Sequential model, or of another one in which each layer takes the layer before it.
@@ -76,15 +111,29 @@ class KerasReader {
       read_stage(text(layer, "class_name"), name, layer.value("config", Json::object()));
       before = name;
     }
+    if (kind != "Sequential") require_output(config.value("output_layers", Json()), before);
     is_stated_ = true;
   }
 
-  /// Inbound nodes are [[["name", 0, 0, {}]]].
+  /// Outputs are [["name", 0, 0]], or ["name", 0, 0] of a single one.
+  void require_output(const Json& outputs, const std::string& last) const {
+    const bool is_list = outputs.is_array() && !outputs.empty();
+    const Json one = is_list && outputs.size() == 1 ? outputs[0] : outputs;
+    if (!is_list || !one.is_array() || one.empty() || one[0] != last)
+      refuse("model_config", in_quotes(last), "is the last layer, but not the only output");
+  }
+
+  /// Inbound nodes are [[["name", 0, 0, {}]]], and since version 3
+  /// [{"args": [{"class_name": "__keras_tensor__", "config": {"keras_history": ["name", 0, 0]}}]}].
   void require_after(const Json& layer, const std::string& name, const std::string& before) const {
-    const Json nodes = layer.value("inbound_nodes", Json::array());
-    const bool is_after = nodes.is_array() && nodes.size() == 1 && nodes[0].is_array() &&
-                          nodes[0].size() == 1 && nodes[0][0].is_array() && !nodes[0][0].empty() &&
-                          nodes[0][0][0] == before;
+    const auto only = [](const Json& list) { return list.is_array() && list.size() == 1 ? list[0] : Json(); };
+    const Json node = only(layer.value("inbound_nodes", Json::array()));
+    Json history = only(node);
+    if (node.is_object()) {
+      const Json tensor = only(node.value("args", Json()));
+      if (tensor.is_object()) history = tensor.value("config", Json::object()).value("keras_history", Json());
+    }
+    const bool is_after = history.is_array() && !history.empty() && history[0] == before;
     if (!is_after) refuse("model_config", in_quotes(name), "does not take the layer before it alone");
   }
 
@@ -94,9 +143,9 @@ class KerasReader {
         "AlphaDropout"};
     if (kIdentities.count(kind) == 1) return;
     if (kind == "Dense") {
-      stages_.push_back({name, activation_called(text(config, "activation"), name)});
+      stages_.push_back({name, activation_of(config, name), config.value("units", std::uint64_t{0})});
     } else if (kind == "Activation") {
-      activate(name, activation_called(text(config, "activation"), name));
+      activate(name, activation_of(config, name));
     } else if (kind == "ReLU") {
       const bool is_plain = number(config, "negative_slope", 0) == 0 && number(config, "threshold", 0) == 0;
       const double most = number(config, "max_value", 0);
@@ -114,7 +163,12 @@ class KerasReader {
     }
   }
 
-  std::string activation_called(const std::string& word, const std::string& layer) {
+  std::string activation_of(const Json& config, const std::string& layer) {
+    const Json stated = config.value("activation", Json());
+    if (!stated.is_null() && !stated.is_string())
+      refuse("model_config", in_quotes(layer), "has an activation of its own, which is not read");
+    const std::string word = text(config, "activation");
+    if (word == "leaky_relu") return "leaky_relu:0.2";  // that of Keras; PyTorch's slope is 0.01
     if (word != "softmax") return word.empty() ? "linear" : word;
     notes_.push_back("the softmax of " + layer + " is omitted: all results are for the logits");
     softmax_ = layer;
@@ -136,28 +190,23 @@ class KerasReader {
     return stage->activation;
   }
 
-  void read_layer(const Hdf5Object& group, const std::string& layer) {
-    const Hdf5Object own = group.open(layer);
-    for (const std::string& weight : own.texts("weight_names").value_or(std::vector<std::string>())) {
-      hdf5::Numbers stored = own.open(weight).numbers();
-      std::string part = weight.substr(weight.rfind('/') + 1);  // npos + 1 is 0
-      part = part.substr(0, part.find(':'));
-      const bool is_kernel = part == "kernel" && stored.shape.size() == 2;
-      if (!is_kernel && part != "bias")
-        refuse(in_quotes(weight), shape_text(stored.shape), "is not part of a Dense layer");
-      if (is_kernel) {  // [inputs, outputs]
-        std::vector<double> transposed;
-        transposed.reserve(stored.numbers.size());
-        for (std::uint64_t out = 0; out < stored.shape[1]; ++out)
-          for (std::uint64_t in = 0; in < stored.shape[0]; ++in)
-            transposed.push_back(stored.numbers[in * stored.shape[1] + out]);
-        stored.numbers = std::move(transposed);
-        std::swap(stored.shape[0], stored.shape[1]);
-      }
-      declared_.push_back({layer + (is_kernel ? ".weight" : ".bias"),
-                           stored.is_float32 ? Precision::kFloat32 : Precision::kFloat64, "", stored.shape});
-      numbers_.push_back(std::move(stored.numbers));
+  void read_tensor(const Hdf5Object& tensor, const std::string& layer, const std::string& part) {
+    hdf5::Numbers stored = tensor.numbers();
+    const bool is_kernel = part == "kernel" && stored.shape.size() == 2;
+    if (!is_kernel && part != "bias")
+      refuse(in_quotes(layer + "/" + part), shape_text(stored.shape), "is not part of a Dense layer");
+    if (is_kernel) {  // [inputs, outputs]
+      std::vector<double> transposed;
+      transposed.reserve(stored.numbers.size());
+      for (std::uint64_t out = 0; out < stored.shape[1]; ++out)
+        for (std::uint64_t in = 0; in < stored.shape[0]; ++in)
+          transposed.push_back(stored.numbers[in * stored.shape[1] + out]);
+      stored.numbers = std::move(transposed);
+      std::swap(stored.shape[0], stored.shape[1]);
     }
+    declared_.push_back({layer + (is_kernel ? ".weight" : ".bias"),
+                         stored.is_float32 ? Precision::kFloat32 : Precision::kFloat64, "", stored.shape});
+    numbers_.push_back(std::move(stored.numbers));
   }
 
   Hdf5Object root_;
@@ -171,7 +220,18 @@ class KerasReader {
   std::vector<std::string> notes_;
 };
 
+constexpr std::uint64_t kLargestModel_bytes = std::uint64_t{1} << 29;
+
 }  // namespace
+
+bool is_keras_archive(const ZipArchive& archive) {
+  return archive.has("config.json") && archive.has("model.weights.h5");
+}
+
+Weights parse_keras_archive(const ZipArchive& archive, const std::string& path, const LayerChoice& choice) {
+  const std::string config = archive.read("config.json", kLargestModel_bytes);
+  return KerasReader(archive.read("model.weights.h5", kLargestModel_bytes), path, choice).run(config);
+}
 
 Weights parse_keras(const std::string& bytes, const std::string& path, const LayerChoice& choice) {
   return KerasReader(bytes, path, choice).run();

@@ -12,6 +12,7 @@
 #include "nn/base/toml.h"
 #include "nn/weights/activation.h"
 #include "nn/weights/functions.h"
+#include "nn/weights/vec_normalize.h"
 
 namespace swarmcert::files {
 namespace {
@@ -375,6 +376,19 @@ Network load_as_stated(const NetworkArguments& arguments) {
   return network;
 }
 
+Network with_normalization(Network network, const std::string& stated) {
+  if (stated == "none") return network;
+  if (!network.plain) {
+    if (stated.empty()) return network;
+    throw InputError({network.path, "", "--normalization", in_quotes(stated),
+                      "is for one plain weight file, and this is a deep set", "leave it out"});
+  }
+  const std::string file = stated.empty() ? vec_normalize_beside(network.plain->path) : stated;
+  if (file.empty()) return network;
+  network.options.normalization = stated.empty() ? "" : from_folder_of(network.plain->path, file);
+  return with_vec_normalize(std::move(network), file);
+}
+
 }  // namespace
 
 void require_relu(const Network& network, const std::string& what) {
@@ -413,20 +427,25 @@ Network load_any_network(const NetworkArguments& arguments) {
   Network network = load_as_stated(arguments);
   if (!arguments.activation.empty()) network = with_activation(std::move(network), arguments.activation);
   network.options = arguments;
-  return network;
+  return with_normalization(std::move(network), arguments.normalization);
 }
 
 Json options_json(const ReadingOptions& options) {
-  return {{"key", options.key},
-          {"order", options.order},
-          {"phi_order", options.phi_order},
-          {"rho_order", options.rho_order},
-          {"select", options.select},
-          {"activation", options.activation}};
+  Json json = {{"key", options.key},
+               {"order", options.order},
+               {"phi_order", options.phi_order},
+               {"rho_order", options.rho_order},
+               {"select", options.select},
+               {"activation", options.activation}};
+  if (!options.normalization.empty()) json["normalization"] = options.normalization;
+  return json;
 }
 
 ReadingOptions options_of(const Json& json) {
-  require_keys(json, {"key", "order", "phi_order", "rho_order", "select", "activation"}, "network.options");
+  std::set<std::string> keys = {"key", "order", "phi_order", "rho_order", "select", "activation"};
+  const bool is_normalized = json.is_object() && json.contains("normalization");
+  if (is_normalized) keys.insert("normalization");
+  require_keys(json, keys, "network.options");
   const auto texts = [&json](const char* name) { return json[name].get<std::vector<std::string>>(); };
   ReadingOptions options;
   options.key = json["key"].get<std::string>();
@@ -435,6 +454,7 @@ ReadingOptions options_of(const Json& json) {
   options.rho_order = texts("rho_order");
   options.select = texts("select");
   options.activation = json["activation"].get<std::string>();
+  if (is_normalized) options.normalization = json["normalization"].get<std::string>();
   return options;
 }
 

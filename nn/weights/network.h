@@ -42,6 +42,9 @@ struct ReadingOptions {
   std::vector<std::string> select = {};  ///< see LayerChoice; of a plain weight file
   std::string activation =
       {};  ///< names, for the layers of every weight file: see with_activation(); empty: not stated
+  /// File of VecNormalize for a plain weight file (vec_normalize.h); in Network::options, from the folder of that.
+  /// "none": none, even if one lies beside it; empty: the one beside it, if there is one.
+  std::string normalization = {};
 };
 
 /// Converts options to an object of a certificate, and back.

@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "nn/weights/enclosed.h"
 #include "nn/weights/weights.h"
 
 namespace swarmcert::files {
@@ -12,5 +13,10 @@ namespace swarmcert::files {
 /// @throws InputError if a range is 0 or the result is not finite.
 /// @throws std::invalid_argument unless there are weights.inputs() + 1 of each.
 Weights normalized(Weights weights, const std::vector<double>& means, const std::vector<double>& ranges);
+
+/// Returns x -> f((x - m) ./ r) with one mean and one range per input. Exact, or with the rounding that Layer states.
+/// @throws InputError as normalized(), and if the first layer was rounded before.
+Weights with_normalized_inputs(Weights weights, const std::vector<Enclosed>& means,
+                               const std::vector<Enclosed>& ranges);
 
 }  // namespace swarmcert::files

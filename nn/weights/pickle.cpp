@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <cstring>
 #include <initializer_list>
 #include <unordered_map>
 #include <utility>
@@ -42,10 +43,21 @@ bool is_passed_over(std::string_view module, std::string_view global) {
   if (module == "torch")
     return is_one_of(global, {"device", "Size", "dtype", "float32", "float64", "float16"});
   if (module == "numpy" || module.substr(0, 6) == "numpy.")
-    return is_one_of(global, {"scalar", "ndarray", "float64", "float32", "int64", "int32", "bool_"});
+    return module.substr(0, 12) == "numpy.random" ||
+           is_one_of(global, {"scalar", "ndarray", "float64", "float32", "int64", "int32", "bool_"});
+  for (const std::string_view package : {"stable_baselines3.", "gymnasium.spaces", "gym.spaces"})
+    if (module.substr(0, package.size()) == package) return true;
   return is_one_of(module, {"argparse", "datetime", "pathlib", "pathlib._local", "decimal", "fractions",
                             "uuid", "collections"}) ||
          (module == "types" && global == "SimpleNamespace") || (module == "enum" && global == "Enum");
+}
+
+double big_endian_double(std::string_view bytes) {
+  std::uint64_t bits = 0;
+  for (const char byte : bytes) bits = bits << 8 | static_cast<unsigned char>(byte);
+  double number;
+  std::memcpy(&number, &bits, sizeof number);
+  return number;
 }
 
 /// Returns torch's name for the type of a NumPy array, or nothing.
@@ -229,12 +241,12 @@ class Machine {
         return push(make(Kind::kInteger, take_signed(4))), true;
       case 0x8a: {  // LONG1
         const std::uint64_t width = take_unsigned(1);
-        if (width > 8) refuse("an integer has more than 64 bits");
+        if (width > 8) return take(width), push(make(Kind::kOpaque)), true;
         return push(make(Kind::kInteger, take_signed(static_cast<int>(width)))), true;
       }
-      case 'G':
-        take(8);
-        return push(make(Kind::kReal)), true;
+      case 'G':  // big-endian
+        push(make(Kind::kReal));
+        return top().real = big_endian_double(take(8)), true;
       case 'U':  // SHORT_BINSTRING, written by Python 2
       case 0x8c:
         return push(make(Kind::kText, 0, take(take_unsigned(1)))), true;
@@ -387,6 +399,8 @@ class Machine {
   /// Sets the state of the object on top of the stack. torch attaches version numbers (_metadata) to a state dict.
   void build(Index state) {
     const Kind kind = top().kind;
+    if (kind == Kind::kDict) top().attributes = state;
+    if (kind == Kind::kOpaque) top().items = {state};
     if (kind == Kind::kDict || kind == Kind::kOpaque) return;
     const std::vector<Index> items = few_items(state);
     if (kind == Kind::kNumberType) {  // (version, byte order, ...)

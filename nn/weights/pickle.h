@@ -1,12 +1,14 @@
 /// @file Reads pickled state dicts as plain data. Nothing in a pickle is executed.
 ///
 /// Python's unpickler runs whatever a file names. This reader knows the opcodes, torch's tensors, NumPy's arrays and
-/// the names of types that hold settings, such as argparse.Namespace and pathlib.Path, whose objects it passes over. It
-/// rejects every other name with its offset. It does not recurse, and its memory is bounded by kMostPickleOperations.
+/// the names of types that hold settings, such as argparse.Namespace, pathlib.Path and those of Stable-Baselines3 and
+/// gymnasium, of whose objects it keeps the state alone. It rejects every other name with its offset. It does not
+/// recurse, and its memory is bounded by kMostPickleOperations.
 #pragma once
 
 #include <cstdint>
 #include <deque>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -50,13 +52,16 @@ struct PickledValue {
     kBytes,
     kNumberType,  ///< numpy.dtype: `text` is "f4", `integer` 1 if big-endian
     kArray,       ///< a NumPy array whose numbers have not been set
-    kOpaque       ///< an object that is passed over
+    kOpaque       ///< an object that is passed over, or an integer of more than 64 bits
   };
   Kind kind = Kind::kNone;
   std::int64_t integer = 0;  ///< kBool, kInteger: the value; kStorage, kTensor: index into Pickle's tables
   std::string_view text;     ///< kText, kBytes, kStorageType; points into the parsed bytes or Pickle::decoded
   std::vector<std::uint32_t>
-      items;  ///< kTuple, kList: indices into Pickle::values; kDict: key, value, key, ...
+      items;  ///< kTuple, kList: indices into Pickle::values; kDict: key, value, key, ...; kOpaque: its state, if any
+  std::optional<std::uint32_t> attributes =
+      {};           ///< of a kDict: what is set on the object itself, as torch's _metadata
+  double real = 0;  ///< kReal
 };
 
 /// One pickle. Values refer to each other by index and may form cycles, so do not recurse over them.

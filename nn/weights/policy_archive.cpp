@@ -100,7 +100,7 @@ Weights parse_policy_archive(const ZipArchive& archive, const std::string& path,
   if (weights.layers.size() < 2) return weights;
   std::string between = stated_activation(data.value("policy_kwargs", Json::object()));
   if (between.empty() && kind == PolicyKind::kOther) {
-    weights.assumed.push_back("ReLU between the layers: the class of the policy is not known");
+    weights.assumed.push_back(kBetweenGuess + std::string("ReLU; the class of the policy is not known"));
     return weights;
   }
   if (between.empty()) between = kind == PolicyKind::kActorCritic ? "tanh" : "relu";

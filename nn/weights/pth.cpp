@@ -1,10 +1,14 @@
 #include "nn/weights/pth.h"
 
+#include <algorithm>
 #include <map>
 #include <memory>
 #include <set>
 
 #include "nn/base/input_error.h"
+#include "nn/weights/activation.h"
+#include "nn/weights/keras.h"
+#include "nn/weights/layer_names.h"
 #include "nn/weights/pickle.h"
 #include "nn/weights/policy_archive.h"
 #include "nn/weights/state_dict.h"
@@ -58,6 +62,21 @@ std::vector<double> numbers_of(const PickledTensor& tensor, std::string_view sto
   return numbers;
 }
 
+/// Returns what the module list says about the function and the tensors do not: a numbered module without tensors
+/// that comes after the last layer, as a final Tanh() in a Sequential does.
+std::optional<std::string> module_behind(const StateDict& dict, const std::string& last) {
+  const std::string container = last.substr(0, last.rfind('.') + 1);  // npos + 1 is 0
+  for (const std::string& module : dict.modules) {
+    const bool is_beside = module.compare(0, container.size(), container) == 0 &&
+                           module.find('.', container.size()) == std::string::npos;
+    const bool holds_tensors =
+        std::any_of(dict.tensors.begin(), dict.tensors.end(),
+                    [&module](const auto& tensor) { return has_prefix(tensor.first, module + "."); });
+    if (is_beside && !holds_tensors && numbered_before(last, module)) return module;
+  }
+  return std::nullopt;
+}
+
 Weights assemble_state_dict(const Pickle& pickle, const StorageBytes& bytes_of, const std::string& path,
                             const std::string& key, const LayerChoice& choice) {
   const StateDict dict = select_state_dict(pickle, key, path);
@@ -86,6 +105,9 @@ Weights assemble_state_dict(const Pickle& pickle, const StorageBytes& bytes_of, 
   if (!dict.key.empty())
     weights.notes.push_back("the state dict is " + in_quotes(dict.key) + ", the only one in the file");
   weights.unused.insert(weights.unused.end(), dict.unused.begin(), dict.unused.end());
+  if (const std::optional<std::string> module = module_behind(dict, weights.layers.back().name))
+    weights.assumed.push_back(kEndGuess + ("nothing, but the file lists the module " + in_quotes(*module)) +
+                              " there; --activation names one more activation for it, or linear");
   return weights;
 }
 
@@ -103,10 +125,6 @@ std::string top_folder(const ZipArchive& archive, const std::string& path) {
       return name.substr(0, slash + 1);
     }
   }
-  if (archive.has("model.weights.h5"))
-    throw InputError({path, "", "model.weights.h5", "",
-                      "the archive is a Keras model, which is not supported",
-                      "export it to ONNX: model.export('net.onnx', format='onnx')"});
   throw InputError({path, "", "", "",
                     "the zip archive has no <folder>/data.pkl, so torch.save did not write it",
                     "save it with torch.save(model.state_dict(), ...)"});
@@ -228,6 +246,7 @@ Weights parse_pth_zip(const std::string& bytes, const std::string& path, const s
                       const LayerChoice& choice) {
   const ZipArchive archive(bytes, path);
   if (is_policy_archive(archive)) return parse_policy_archive(archive, path, key, choice);
+  if (is_keras_archive(archive)) return parse_keras_archive(archive, path, choice);
   const std::string folder = top_folder(archive, path);
   refuse_other_archives(archive, folder, path);
   const std::string program = archive.read(folder + "data.pkl", kLargestPickle_bytes);

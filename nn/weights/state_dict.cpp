@@ -47,11 +47,26 @@ class Selector {
         throw InputError({path_, "", in_quotes(text), name(entry.kind), "is not a tensor", choose(key)});
       }
     }
+    result.modules = modules_of(dict);
     return result;
   }
 
  private:
   const PickledValue& value(Index index) const { return pickle_.values[index]; }
+
+  /// Returns the keys of the dict "_metadata" among the attributes of `dict`.
+  std::vector<std::string> modules_of(const PickledValue& dict) const {
+    std::vector<std::string> modules;
+    if (!dict.attributes) return modules;
+    const PickledValue& attributes = value(*dict.attributes);
+    for (std::size_t i = 0; attributes.kind == Kind::kDict && i + 1 < attributes.items.size(); i += 2) {
+      const PickledValue& metadata = value(attributes.items[i + 1]);
+      if (value(attributes.items[i]).text != "_metadata" || metadata.kind != Kind::kDict) continue;
+      for (std::size_t k = 0; k < metadata.items.size(); k += 2)
+        modules.emplace_back(value(metadata.items[k]).text);
+    }
+    return modules;
+  }
 
   bool holds_tensor(Index index) const {
     const PickledValue& dict = value(index);

@@ -14,6 +14,8 @@ struct StateDict {
   std::vector<std::pair<std::string, std::size_t>>
       tensors;                      ///< names and indices into Pickle::tensors, in the file's order
   std::vector<std::string> unused;  ///< see Weights::unused
+  /// The modules in torch's _metadata, in the order of registration: those without tensors too. Empty: not listed.
+  std::vector<std::string> modules;
   std::string key;  ///< the dotted path, if it was not given and the file holds only one state dict
 };
 

@@ -5,17 +5,20 @@ any code of swarmcert.
     file_is_function.py CERTIFICATE FILE [--part NAME] [--points N]
 
 Reads .pth with torch, .safetensors with safetensors, .npz with numpy, .mat with scipy, or h5py for version 7.3, .h5
-with h5py, and .onnx with onnxruntime or onnx's reference evaluator. State dicts and arrays hold no function: their
-tensors are looked up under the names in the certificate and evaluated with its chain, here in double. An ONNX model is
-evaluated by its runtime.
+and .keras with h5py, and .onnx with onnxruntime or onnx's reference evaluator. State dicts and arrays hold no function:
+their tensors are looked up under the names in the certificate and evaluated with its chain, here in double. An ONNX
+model is evaluated by its runtime.
 Exit codes: 0 equal; 1 they differ, with the input; 3 the file cannot be read; 4 not run: no library of this format is
 installed here, or the certificate names no tensors, because layers were folded.
 """
 import argparse
 import importlib
+import io
+import json
 import math
 import random
 import sys
+import zipfile
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -108,8 +111,22 @@ def of_keras(path, _):
     return found
 
 
+def of_keras_archive(path, _):
+    h5py, found = library("h5py"), {}
+    with zipfile.ZipFile(path) as archive:
+        stated = json.loads(archive.read("config.json"))["config"]["layers"]
+        with h5py.File(io.BytesIO(archive.read("model.weights.h5"))) as file:
+            dense = [layer["config"]["name"] for layer in stated if layer["class_name"] == "Dense"]
+            for k, name in enumerate(dense):
+                stored = file["layers"][f"dense_{k}" if k else "dense"]["vars"]
+                found[f"{name}.weight"] = stored["0"][()].astype("float64").T.tolist()
+                if "1" in stored:
+                    found[f"{name}.bias"] = stored["1"][()].astype("float64").tolist()
+    return found
+
+
 TENSORS = {".pth": of_torch, ".pt": of_torch, ".safetensors": of_safetensors, ".npz": of_npz, ".mat": of_mat,
-           ".h5": of_keras}
+           ".h5": of_keras, ".keras": of_keras_archive}
 
 
 def spellings(tensor):

@@ -150,6 +150,8 @@ TEST(FileMeaning, ObjectsBesideTheStateDictArePassedOverAndOtherTypesRefused) {
       parse_weights(checkpoint(global_op("pathlib", "PosixPath") + text_op("runs") + "\x85R"), "net.pth")
           .layers.size(),
       2u);
+  const std::string generator = "\x8a\x10" + std::string(16, '\1');  // 128 bits of a random generator
+  EXPECT_EQ(parse_weights(checkpoint(generator), "net.pth").layers.size(), 2u);
   EXPECT_TRUE(refuses(
       [&] { parse_weights(checkpoint(global_op("os", "system") + text_op("true") + "\x85R"), "net.pth"); },
       {"os.system", "nothing was executed"}));
@@ -202,6 +204,33 @@ TEST(FileMeaning, PoliciesOfStableBaselinesNeedASelectionAndHaveTheirActivations
   EXPECT_EQ(actor.activation_names(), "tanh");
   const std::string relu = R"("activation_fn":"<class 'torch.nn.modules.activation.ReLU'>")";
   EXPECT_TRUE(parse_weights(archive(relu), "ppo.zip", "", selected({"value"})).is_relu());
+}
+
+TEST(FileMeaning, AModuleThatTheMetadataListBehindTheLastLayerIsAssumedToBeNothingUntilItIsStated) {
+  const std::vector<std::string> modules = {"", "0", "1", "2", "3"};
+  const auto sequential = [&modules](std::size_t count) {
+    std::string metadata = "}" + text_op("_metadata") + ordered_dict_op({});
+    for (std::size_t k = 0; k < count; ++k)
+      metadata += text_op(modules[k]) + "}" + text_op("version") + "K\1ss";
+    const std::vector<TensorSpec> tensors = {{"0.weight", "a", 4, {2, 2}, {2, 1}},
+                                             {"2.weight", "b", 2, {1, 2}, {2, 1}}};
+    return zip_file(
+        pickle(state_dict_op(tensors, false) + metadata + "sb"),
+        {{"a", raw_numbers(std::vector<float>{1, 2, 3, 4})}, {"b", raw_numbers(std::vector<float>{1, 2})}});
+  };
+  EXPECT_TRUE(parse_weights(sequential(4), "net.pth").assumed.empty());
+  const Weights guessed = parse_weights(sequential(5), "net.pth");
+  ASSERT_EQ(guessed.assumed.size(), 1u);
+  EXPECT_NE(guessed.assumed[0].find("the module \"3\""), std::string::npos) << guessed.assumed[0];
+  EXPECT_FALSE(with_activation(guessed, "tanh").assumed.empty()) << "one name is what lies between layers";
+  EXPECT_TRUE(with_activation(guessed, "tanh,tanh").assumed.empty());
+  EXPECT_TRUE(with_activation(guessed, "relu,linear").assumed.empty());
+}
+
+TEST(FileMeaning, ActivationsAreNamedOnceWhereAllAreAlike) {
+  const Weights weights = with_activation(
+      parse_weights(state_dict_of({{"0", 3, 2}, {"2", 3, 3}, {"4", 1, 3}}), "net.pth"), "relu6");
+  EXPECT_EQ(weights.notes.back(), "piecewise linear activations of relu6 are written with ReLU");
 }
 
 TEST(FileMeaning, NormsAreThoseOfTheStoredMatrices) {

@@ -6,6 +6,7 @@
 
 #include "hdf5_writer.h"
 #include "nn/weights/weights.h"
+#include "pth_writer.h"
 #include "refusal.h"
 
 namespace swarmcert::files {
@@ -138,6 +139,64 @@ TEST(Keras, AnUnknownActivationOrAFileWithoutLayersIsRefused) {
   Hdf5Writer other;
   other.add("table", {2, 2}, {1, 2, 3, 4});
   EXPECT_TRUE(hdf5_is_refused(other.bytes(), {"without the layers of a Keras model"}));
+}
+
+std::string functional_keras(const std::string& outputs) {
+  return R"({"class_name": "Functional", "config": {"name": "m", "layers": [
+    {"class_name": "InputLayer", "config": {"name": "x"}, "inbound_nodes": []},
+    {"class_name": "Dense", "config": {"name": "policy_1", "units": 3, "activation": "leaky_relu"}, "inbound_nodes":
+     [{"args": [{"class_name": "__keras_tensor__", "config": {"keras_history": ["x", 0, 0]}}], "kwargs": {}}]},
+    {"class_name": "Dense", "config": {"name": "head", "units": 1, "activation": "linear"}, "inbound_nodes":
+     [{"args": [{"class_name": "__keras_tensor__", "config": {"keras_history": ["policy_1", 0, 0]}}], "kwargs": {}}]}],
+    "output_layers": )" +
+         outputs + "}}";
+}
+
+std::string keras_archive(const std::string& config, const std::string& folder = "layers") {
+  Hdf5Writer writer;
+  writer.add(folder + "/dense/vars/0", {2, 3}, {1, 2, 3, 4, 5, 6}, H5T_IEEE_F32LE);
+  writer.add(folder + "/dense/vars/1", {3}, {0.5, 0.25, 0.125}, H5T_IEEE_F32LE);
+  writer.add(folder + "/dense_1/vars/0", {3, 1}, {1, -1, 2}, H5T_IEEE_F32LE);
+  return tests::zip({{"metadata.json", "{}"}, {"config.json", config}, {"model.weights.h5", writer.bytes()}});
+}
+
+TEST(KerasArchive, LayersAreFoundByTheirClassInTheOrderOfTheConfiguration) {
+  for (const char* const folder : {"layers", "_layer_checkpoint_dependencies"}) {
+    const Weights weights =
+        parse_weights(keras_archive(functional_keras(R"(["head", 0, 0])"), folder), "net.keras");
+    ASSERT_EQ(weights.layers.size(), 2u);
+    EXPECT_EQ(weights.layers[0].outputs, 6) << "leaky_relu is written with ReLU of both signs";
+    EXPECT_EQ(weights.stored_layers()[0].weights, (std::vector<double>{1, 4, 2, 5, 3, 6}));
+    EXPECT_EQ(weights.stored_layers()[0].name, "policy_1");
+    EXPECT_TRUE(weights.assumed.empty());
+  }
+}
+
+TEST(KerasArchive, LeakyReluHasTheSlopeOfKerasNotOfPyTorch) {
+  const Evaluator<double> f(
+      parse_weights(keras_archive(functional_keras(R"([["head", 0, 0]])")), "net.keras"));
+  const double h[] = {-4.5, -6.75, -8.875};  // of the input (-1, -1)
+  EXPECT_NEAR(f({-1, -1})[0], 0.2 * (h[0] - h[1] + 2 * h[2]), 1e-12);
+}
+
+TEST(KerasArchive, OutputsAndShapesThatDoNotFitTheConfigurationAreRefused) {
+  for (const char* const outputs :
+       {R"([["policy_1", 0, 0], ["head", 0, 0]])", R"(["policy_1", 0, 0])", "null"})
+    EXPECT_TRUE(tests::refuses([&] { parse_weights(keras_archive(functional_keras(outputs)), "net.keras"); },
+                               {"head", "not the only output"}));
+  std::string other = functional_keras(R"(["head", 0, 0])");
+  other.replace(other.find("\"units\": 3"), 10, "\"units\": 4");
+  EXPECT_TRUE(tests::refuses([&] { parse_weights(keras_archive(other), "net.keras"); },
+                             {"policy_1", "4 outputs of the configuration"}));
+}
+
+TEST(Keras, AnActivationThatIsAnObjectIsNotTakenForNone) {
+  std::string model = tests::small_keras("tanh");
+  EXPECT_NO_THROW(parse_weights(model, "net.h5"));
+  std::string config = functional_keras(R"(["head", 0, 0])");
+  config.replace(config.find("\"leaky_relu\""), 12, R"({"class_name": "function", "config": "mine"})");
+  EXPECT_TRUE(tests::refuses([&] { parse_weights(keras_archive(config), "net.keras"); },
+                             {"policy_1", "an activation of its own"}));
 }
 
 }  // namespace

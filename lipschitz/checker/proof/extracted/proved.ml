@@ -67,6 +67,38 @@ let eqb b1 b2 =
 
 module Nat =
  struct
+  (** val even : int -> bool **)
+
+  let rec even n =
+    (fun fO fS n -> if n=0 then fO () else fS (n-1))
+      (fun _ -> true)
+      (fun n0 ->
+      (fun fO fS n -> if n=0 then fO () else fS (n-1))
+        (fun _ -> false)
+        (fun n' -> even n')
+        n0)
+      n
+
+  (** val divmod : int -> int -> int -> int -> int * int **)
+
+  let rec divmod x y q u =
+    (fun fO fS n -> if n=0 then fO () else fS (n-1))
+      (fun _ -> (q, u))
+      (fun x' ->
+      (fun fO fS n -> if n=0 then fO () else fS (n-1))
+        (fun _ -> divmod x' y (Stdlib.Int.succ q) y)
+        (fun u' -> divmod x' y q u')
+        u)
+      x
+
+  (** val div : int -> int -> int **)
+
+  let div x y =
+    (fun fO fS n -> if n=0 then fO () else fS (n-1))
+      (fun _ -> y)
+      (fun y' -> fst (divmod x y' 0 y'))
+      y
+
   (** val div2 : int -> int **)
 
   let rec div2 = fun n -> n/2
@@ -675,9 +707,9 @@ let rec band zero0 add1 mul1 two_rho minus_rho t later last0 =
     'a1 list -> 'a1 list list -> ('a1 list * 'a1 list list) list -> 'a1 list
     list -> 'a1 list list **)
 
-let lmi zero0 add1 mul1 minus_one two_rho minus_rho t first0 later last0 =
+let lmi zero0 add1 mul1 minus_one0 two_rho minus_rho t first0 later last0 =
   sum add1
-    (scale_all mul1 minus_one
+    (scale_all mul1 minus_one0
       (gram zero0 add1 mul1 (scale_rows mul1 t first0)))
     (band zero0 add1 mul1 two_rho minus_rho t later last0)
 
@@ -766,6 +798,15 @@ let rec by_number f g a l =
   | Keeping (n, b) -> app (by_number f g b (firstn n l)) (map g (skipn n l))
   | _ -> map (f a) l
 
+type 't relation =
+| Each of ('t * 't) list
+| Grouped of int * int
+
+(** val spread : int -> 'a1 list -> 'a1 list **)
+
+let spread k t =
+  flat_map (fun a -> repeat a k) t
+
 (** val weighted_gram :
     'a1 -> ('a1 -> 'a1 -> 'a1) -> ('a1 -> 'a1 -> 'a1) -> 'a1 list -> 'a1 list
     list -> 'a1 list list **)
@@ -823,10 +864,47 @@ let weighted add1 mul1 hidden0 =
     'a1 -> ('a1 -> 'a1 -> 'a1) -> ('a1 -> 'a1 -> 'a1) -> 'a1 -> 'a1 -> 'a1
     list -> 'a1 bent_layer list -> 'a1 list list -> 'a1 list list **)
 
-let bent_lmi zero0 add1 mul1 two minus_one t hidden0 last0 =
+let bent_lmi zero0 add1 mul1 two minus_one0 t hidden0 last0 =
   sum add1
-    (band zero0 add1 mul1 two minus_one t (weighted add1 mul1 hidden0) last0)
+    (band zero0 add1 mul1 two minus_one0 t (weighted add1 mul1 hidden0) last0)
     (scale_all mul1 two (bends zero0 add1 mul1 (length t) hidden0))
+
+(** val fitted : 'a1 -> ('a1 -> 'a1 -> 'a1) -> int -> 'a1 list -> 'a1 list **)
+
+let fitted zero0 add1 n u =
+  firstn n (plus add1 u (repeat zero0 n))
+
+(** val sum_rows :
+    'a1 -> ('a1 -> 'a1 -> 'a1) -> 'a1 -> int -> int -> int -> int -> 'a1 list
+    list -> 'a1 list list **)
+
+let rec sum_rows zero0 add1 minus_one0 inputs0 before n k m =
+  (fun fO fS n -> if n=0 then fO () else fS (n-1))
+    (fun _ -> [])
+    (fun n' ->
+    (app (fitted zero0 add1 inputs0 (fold_right (plus add1) [] (firstn k m)))
+      (app (repeat zero0 before) (repeat minus_one0 k))) :: (sum_rows zero0
+                                                              add1 minus_one0
+                                                              inputs0
+                                                              (add before k)
+                                                              n' k
+                                                              (skipn k m)))
+    n
+
+type 't pin = ('t list * 't list list) * int
+
+(** val pins :
+    'a1 -> ('a1 -> 'a1 -> 'a1) -> ('a1 -> 'a1 -> 'a1) -> int -> 'a1 pin list
+    -> 'a1 list list **)
+
+let rec pins zero0 add1 mul1 n = function
+| [] -> []
+| p :: ps' ->
+  let (p0, width) = p in
+  let (s, rows0) = p0 in
+  sum add1
+    (weighted_gram zero0 add1 mul1 s (columns zero0 (add n width) rows0))
+    (app (repeat [] n) (pins zero0 add1 mul1 width ps'))
 
 (** val dotZ : Big.t list -> Big.t list -> Big.t **)
 
@@ -1004,11 +1082,6 @@ let rec split t = function
 | [] -> []
 | m :: ms' -> (firstn (length m) t) :: (split (skipn (length m) t) ms')
 
-(** val neurons : matrixD list -> int **)
-
-let neurons ms =
-  fold_right (fun m n -> add (length m) n) 0 ms
-
 (** val inputs : matrixD list -> matrixD -> int **)
 
 let inputs hidden0 last0 =
@@ -1027,12 +1100,103 @@ let is_unit_range r =
   (&&) (is_zero (fst r))
     (is_zero (add0 (snd r) ((Big.neg Big.one), Big.zero)))
 
+type relationD = dyadic relation
+
+(** val is_unit_relation : relationD -> bool **)
+
+let is_unit_relation = function
+| Each ranges -> forallb is_unit_range ranges
+| Grouped (_, _) -> false
+
+(** val is_grouped : relationD -> bool **)
+
+let is_grouped = function
+| Each _ -> false
+| Grouped (_, _) -> true
+
+(** val multipliers_in : relationD -> matrixD -> int **)
+
+let multipliers_in r m =
+  match r with
+  | Each _ -> length m
+  | Grouped (n, _) -> add n n
+
+(** val multipliers_needed : relationD list -> matrixD list -> int **)
+
+let rec multipliers_needed rs hidden0 =
+  match rs with
+  | [] ->
+    (match hidden0 with
+     | [] -> 0
+     | m :: hidden' -> add (length m) (multipliers_needed [] hidden'))
+  | r :: rs' ->
+    (match hidden0 with
+     | [] -> 0
+     | m :: hidden' ->
+       add (multipliers_in r m) (multipliers_needed rs' hidden'))
+
+(** val groups_fit : relationD list -> matrixD list -> bool **)
+
+let rec groups_fit rs hidden0 =
+  match rs with
+  | [] -> true
+  | r :: rs' ->
+    (match r with
+     | Each _ ->
+       (match hidden0 with
+        | [] -> true
+        | _ :: hidden' -> groups_fit rs' hidden')
+     | Grouped (n, k) ->
+       (match hidden0 with
+        | [] -> true
+        | m :: hidden' ->
+          (&&) ((=) (length m) (mul n k)) (groups_fit rs' hidden')))
+
+(** val minus_one : dyadic **)
+
+let minus_one =
+  ((Big.neg Big.one), Big.zero)
+
+(** val bent_of :
+    relationD list -> matrixD list -> dyadic list -> dyadic bent_layer list **)
+
+let rec bent_of rs hidden0 t =
+  match rs with
+  | [] -> []
+  | r :: rs' ->
+    (match hidden0 with
+     | [] -> []
+     | m :: hidden' ->
+       (match r with
+        | Each ranges -> ((ranges, (firstn (length m) t)), m)
+        | Grouped (n, k) ->
+          (((repeat (minus_one, (((fun p -> p) Big.one), Big.zero)) (mul n k)),
+            (spread k (firstn n t))), m)) :: (bent_of rs' hidden'
+                                               (skipn (multipliers_in r m) t)))
+
+(** val pins_of :
+    int -> relationD list -> matrixD list -> dyadic list -> dyadic pin list **)
+
+let rec pins_of n rs hidden0 t =
+  match rs with
+  | [] -> []
+  | r :: rs' ->
+    (match hidden0 with
+     | [] -> []
+     | m :: hidden' ->
+       (match r with
+        | Each _ -> (([], []), (length m))
+        | Grouped (g, k) ->
+          (((firstn g (skipn g t)),
+            (sum_rows zero add0 minus_one n 0 g k m)), (length m))) :: 
+         (pins_of (length m) rs' hidden' (skipn (multipliers_in r m) t)))
+
 (** val matrix_inequality :
-    rangeD list list -> matrixD list -> matrixD -> dyadic -> dyadic list ->
+    relationD list -> matrixD list -> matrixD -> dyadic -> dyadic list ->
     matrixD **)
 
-let matrix_inequality ranges hidden0 last0 rho t =
-  if forallb (forallb is_unit_range) ranges
+let matrix_inequality rs hidden0 last0 rho t =
+  if forallb is_unit_relation rs
   then (match hidden0 with
         | [] ->
           let n = length (hd [] last0) in
@@ -1043,10 +1207,16 @@ let matrix_inequality ranges hidden0 last0 rho t =
             (mul0 (((fun p -> p) Big.one), ((fun p -> p) Big.one)) rho)
             (neg rho) (firstn (length first0) t) first0
             (combine (split (skipn (length first0) t) later) later) last0)
-  else bent_lmi zero add0 mul0 (((fun p -> p) Big.one), ((fun p -> p)
-         Big.one)) ((Big.neg Big.one), Big.zero)
-         (repeat (shift (Big.neg Big.one) rho) (inputs hidden0 last0))
-         (combine (combine ranges (split t hidden0)) hidden0) last0
+  else let n = inputs hidden0 last0 in
+       let bent =
+         bent_lmi zero add0 mul0 (((fun p -> p) Big.one), ((fun p -> p)
+           Big.one)) ((Big.neg Big.one), Big.zero)
+           (repeat (shift (Big.neg Big.one) rho) n) (bent_of rs hidden0 t)
+           last0
+       in
+       if existsb is_grouped rs
+       then sum add0 bent (pins zero add0 mul0 n (pins_of n rs hidden0 t))
+       else bent
 
 (** val shapes : int -> matrixD list -> matrixD -> bool **)
 
@@ -1058,20 +1228,22 @@ let rec shapes n hidden0 last0 =
       (shapes (length m) hidden' last0)
 
 (** val check :
-    rangeD list list -> matrixD list -> matrixD -> dyadic -> dyadic -> dyadic
+    relationD list -> matrixD list -> matrixD -> dyadic -> dyadic -> dyadic
     list -> factor -> bool **)
 
-let check ranges hidden0 last0 upper rho t f =
-  (&&) (shapes (inputs hidden0 last0) hidden0 last0)
+let check rs hidden0 last0 upper rho t f =
+  (&&)
+    ((&&) (shapes (inputs hidden0 last0) hidden0 last0)
+      (groups_fit rs hidden0))
     ((&&)
       ((&&)
         ((&&)
           ((&&)
-            ((&&) ((=) (length t) (neurons hidden0))
+            ((&&) ((=) (length t) (multipliers_needed rs hidden0))
               (forallb is_nonnegative t)) (is_positive rho))
           (is_nonnegative upper))
         (is_nonnegative (add0 (mul0 upper upper) (neg rho))))
-      (shows_nonnegative (matrix_inequality ranges hidden0 last0 rho t) f))
+      (shows_nonnegative (matrix_inequality rs hidden0 last0 rho t) f))
 
 type stack = matrixD list * matrixD
 
@@ -1296,12 +1468,12 @@ let outputs hidden0 n =
   length (last hidden0 (repeat [] n))
 
 (** val check_parts :
-    rangeD list list -> stack -> stack list -> dyadic -> dyadic -> dyadic
-    list -> factor -> bool **)
+    relationD list -> stack -> stack list -> dyadic -> dyadic -> dyadic list
+    -> factor -> bool **)
 
-let rec check_parts ranges p ps upper r t f =
+let rec check_parts rs p ps upper r t f =
   match ps with
-  | [] -> check ranges (fst p) (snd p) upper r t f
+  | [] -> check rs (fst p) (snd p) upper r t f
   | q :: ps' ->
     let joined = set_stages (fst p) (snd p) (fst q) (snd q) in
     let n = inputs (fst p) (snd p) in
@@ -1312,7 +1484,7 @@ let rec check_parts ranges p ps upper r t f =
             ((=) (inputs (fst joined) (snd joined)) n))
           (shapes n (fst p) (snd p)))
         (shapes (length (snd p)) (fst q) (snd q)))
-      (check_parts ranges joined ps' upper r t f)
+      (check_parts rs joined ps' upper r t f)
 
 (** val count : bool list -> int **)
 
@@ -3153,9 +3325,9 @@ let rounded rounding f =
 (** val met : dyadic list -> (dyadic * dyadic) -> linear -> known **)
 
 let met radius i f =
-  let spread = add0 f.error (dot zero add0 mul0 (map abs f.slope) radius) in
-  (((larger (fst i) (add0 f.middle (neg spread))),
-  (smaller (snd i) (add0 f.middle spread))), f)
+  let spread0 = add0 f.error (dot zero add0 mul0 (map abs f.slope) radius) in
+  (((larger (fst i) (add0 f.middle (neg spread0))),
+  (smaller (snd i) (add0 f.middle spread0))), f)
 
 (** val passed :
     dyadic list -> dyadic -> matrixD -> dyadic list -> known list -> known
@@ -4045,11 +4217,24 @@ let divided_ranges a rows0 =
 let whole_ranges a rows0 =
   by_number (fun b _ -> range_of b) (fun _ -> kept_range) a rows0
 
-(** val ranges_by :
-    (activation -> matrixD -> rangeD list) -> part -> rangeD list list **)
+(** val relation_by :
+    (activation -> matrixD -> rangeD list) -> activation -> matrixD ->
+    relationD **)
 
-let ranges_by ranges p =
-  map (fun l -> ranges (fst l) (fst (snd l))) (following p.between p.hidden)
+let relation_by ranges a rows0 =
+  match a with
+  | Sorted s ->
+    (match s with
+     | Groups k -> Grouped ((Nat.div (length rows0) k), k)
+     | _ -> Each (ranges a rows0))
+  | _ -> Each (ranges a rows0)
+
+(** val relations_by :
+    (activation -> matrixD -> rangeD list) -> part -> relationD list **)
+
+let relations_by ranges p =
+  map (fun l -> relation_by ranges (fst l) (fst (snd l)))
+    (following p.between p.hidden)
 
 (** val relu_between : part -> bool **)
 
@@ -4060,6 +4245,122 @@ let relu_between p =
 
 let entrywise_between p =
   forallb changes_numbers p.between
+
+(** val chained : activation -> 'a1 list -> bool **)
+
+let chained a rows0 =
+  match a with
+  | Sorted s ->
+    (match s with
+     | Groups k -> (=) (length rows0) (mul (Nat.div (length rows0) k) k)
+     | _ -> changes_numbers a)
+  | _ -> changes_numbers a
+
+(** val chained_between : part -> bool **)
+
+let chained_between p =
+  forallb (fun l -> chained (fst l) (fst (snd l)))
+    (following p.between p.hidden)
+
+(** val interleaved : 'a1 list -> 'a1 list -> 'a1 list **)
+
+let rec interleaved u v =
+  match u with
+  | [] -> []
+  | a :: u' ->
+    (match v with
+     | [] -> []
+     | b :: v' -> a :: (b :: (interleaved u' v')))
+
+(** val by_pairs : 'a1 list -> 'a1 list **)
+
+let by_pairs l =
+  let h = Nat.div2 (length l) in interleaved (firstn h l) (skipn h l)
+
+(** val turned : 'a1 list -> 'a1 list **)
+
+let turned row =
+  let h = Nat.div2 (length row) in interleaved (skipn h row) (firstn h row)
+
+(** val turned_if : bool -> 'a1 list list -> 'a1 list list **)
+
+let turned_if b m =
+  if b then map turned m else m
+
+(** val regrouped_layers :
+    bool -> activation list -> layerD list -> layerD -> activation
+    list * (layerD list * layerD) **)
+
+let rec regrouped_layers turn between0 hidden0 last0 =
+  match hidden0 with
+  | [] -> ([], ([], ((turned_if turn (fst last0)), (snd last0))))
+  | l :: hidden' ->
+    let (m, b) = l in
+    let m' = turned_if turn m in
+    (match hd Relu between0 with
+     | Sorted s ->
+       (match s with
+        | Groups k ->
+          let p = ((Sorted (Groups k)), (m', b)) in
+          let is_turned = false in
+          let (a, l0) = p in
+          let rest0 = regrouped_layers is_turned (tl between0) hidden' last0
+          in
+          ((a :: (fst rest0)), ((l0 :: (fst (snd rest0))), (snd (snd rest0))))
+        | Halves ->
+          let p = ((Sorted (Groups (Stdlib.Int.succ (Stdlib.Int.succ 0)))),
+            ((by_pairs m'), (by_pairs b)))
+          in
+          let is_turned = true in
+          let (a, l0) = p in
+          let rest0 = regrouped_layers is_turned (tl between0) hidden' last0
+          in
+          ((a :: (fst rest0)), ((l0 :: (fst (snd rest0))), (snd (snd rest0))))
+        | Pairs ->
+          let p = ((Sorted (Groups (Stdlib.Int.succ (Stdlib.Int.succ 0)))),
+            (m', b))
+          in
+          let is_turned = true in
+          let (a, l0) = p in
+          let rest0 = regrouped_layers is_turned (tl between0) hidden' last0
+          in
+          ((a :: (fst rest0)), ((l0 :: (fst (snd rest0))), (snd (snd rest0)))))
+     | x ->
+       let p = (x, (m', b)) in
+       let is_turned = false in
+       let (a, l0) = p in
+       let rest0 = regrouped_layers is_turned (tl between0) hidden' last0 in
+       ((a :: (fst rest0)), ((l0 :: (fst (snd rest0))), (snd (snd rest0)))))
+
+(** val regrouped : part -> part **)
+
+let regrouped p =
+  let r = regrouped_layers false p.between p.hidden p.outer in
+  { hidden = (fst (snd r)); outer = (snd (snd r)); clamp = p.clamp; between =
+  (fst r) }
+
+(** val turns_fit : activation list -> layerD list -> layerD -> bool **)
+
+let rec turns_fit between0 hidden0 last0 =
+  match hidden0 with
+  | [] -> true
+  | l :: hidden' ->
+    let (m, _) = l in
+    (&&)
+      (match hd Relu between0 with
+       | Sorted s ->
+         (match s with
+          | Groups _ -> true
+          | _ ->
+            (&&) (Nat.even (length m))
+              (forallb (fun r -> (=) (length r) (length m))
+                (fst (hd last0 hidden'))))
+       | _ -> true) (turns_fit (tl between0) hidden' last0)
+
+(** val may_regroup : part -> bool **)
+
+let may_regroup p =
+  (&&) (fits_part p) (turns_fit p.between p.hidden p.outer)
 
 (** val parts_of : part list -> function0 -> part list **)
 
@@ -4085,12 +4386,15 @@ let well_formed ps f moves scale0 =
     dyadic list -> factor -> bool **)
 
 let check_slope ps f moves scale0 u rho t factor0 =
-  (&&)
+  let qs = map regrouped ps in
+  (&&) (forallb may_regroup (parts_of ps f))
     ((&&)
-      ((&&) (well_formed ps f moves scale0)
-        (forallb entrywise_between (parts_of ps f))) (is_nonnegative u))
-    (check_parts (flat_map (ranges_by divided_ranges) (parts_of ps f)) ([],
-      (selector moves scale0)) (map matrices (parts_of ps f)) u rho t factor0)
+      ((&&)
+        ((&&) (well_formed qs f moves scale0)
+          (forallb chained_between (parts_of qs f))) (is_nonnegative u))
+      (check_parts (flat_map (relations_by divided_ranges) (parts_of qs f))
+        ([], (selector moves scale0)) (map matrices (parts_of qs f)) u rho t
+        factor0))
 
 (** val find_norm : claim list -> int -> int -> dyadic option **)
 
@@ -4234,15 +4538,14 @@ let ranges_on_box p b =
   ranges_centred radius (rounding_of radius) p.between p.hidden
     (inputs_known 0 c)
 
-(** val local_ranges :
-    part list -> function0 -> box -> rangeD list list list **)
+(** val local_relations :
+    part list -> function0 -> box -> relationD list list **)
 
-let local_ranges ps f b =
-  (ranges_on_box (part_at ps (moved f)) b) :: (match f with
-                                               | Alone _ -> []
-                                               | Set_of (_, rho) ->
-                                                 (ranges_by whole_ranges
-                                                   (part_at ps rho)) :: [])
+let local_relations ps f b =
+  (map (fun x -> Each x) (ranges_on_box (part_at ps (moved f)) b)) :: (
+    match f with
+    | Alone _ -> []
+    | Set_of (_, rho) -> (relations_by whole_ranges (part_at ps rho)) :: [])
 
 (** val undivided_matrices : part -> stack **)
 
@@ -4258,8 +4561,9 @@ let check_local_slope ps f moves scale0 b u rho t factor0 =
     ((&&)
       ((&&) (well_formed ps f moves scale0)
         (forallb entrywise_between (parts_of ps f))) (is_nonnegative u))
-    (check_parts (concat (local_ranges ps f b)) ([], (selector moves scale0))
-      (map undivided_matrices (parts_of ps f)) u rho t factor0)
+    (check_parts (concat (local_relations ps f b)) ([],
+      (selector moves scale0)) (map undivided_matrices (parts_of ps f)) u rho
+      t factor0)
 
 (** val check_parts_with :
     part list -> function0 -> bool list -> dyadic list -> dyadic -> dyadic ->

@@ -30,6 +30,12 @@ val eqb : bool -> bool -> bool
 
 module Nat :
  sig
+  val even : int -> bool
+
+  val divmod : int -> int -> int -> int -> int * int
+
+  val div : int -> int -> int
+
   val div2 : int -> int
  end
 
@@ -201,6 +207,12 @@ val by_number :
   (activation -> 'a1 -> 'a2) -> ('a1 -> 'a2) -> activation -> 'a1 list -> 'a2
   list
 
+type 't relation =
+| Each of ('t * 't) list
+| Grouped of int * int
+
+val spread : int -> 'a1 list -> 'a1 list
+
 val weighted_gram :
   'a1 -> ('a1 -> 'a1 -> 'a1) -> ('a1 -> 'a1 -> 'a1) -> 'a1 list -> 'a1 list
   list -> 'a1 list list
@@ -226,6 +238,18 @@ val weighted :
 val bent_lmi :
   'a1 -> ('a1 -> 'a1 -> 'a1) -> ('a1 -> 'a1 -> 'a1) -> 'a1 -> 'a1 -> 'a1 list
   -> 'a1 bent_layer list -> 'a1 list list -> 'a1 list list
+
+val fitted : 'a1 -> ('a1 -> 'a1 -> 'a1) -> int -> 'a1 list -> 'a1 list
+
+val sum_rows :
+  'a1 -> ('a1 -> 'a1 -> 'a1) -> 'a1 -> int -> int -> int -> int -> 'a1 list
+  list -> 'a1 list list
+
+type 't pin = ('t list * 't list list) * int
+
+val pins :
+  'a1 -> ('a1 -> 'a1 -> 'a1) -> ('a1 -> 'a1 -> 'a1) -> int -> 'a1 pin list ->
+  'a1 list list
 
 val dotZ : Big.t list -> Big.t list -> Big.t
 
@@ -281,8 +305,6 @@ val norm_inequality : dyadic -> matrixD -> matrixD
 
 val split : dyadic list -> matrixD list -> dyadic list list
 
-val neurons : matrixD list -> int
-
 val inputs : matrixD list -> matrixD -> int
 
 val is_zero : dyadic -> bool
@@ -291,14 +313,34 @@ type rangeD = dyadic * dyadic
 
 val is_unit_range : rangeD -> bool
 
+type relationD = dyadic relation
+
+val is_unit_relation : relationD -> bool
+
+val is_grouped : relationD -> bool
+
+val multipliers_in : relationD -> matrixD -> int
+
+val multipliers_needed : relationD list -> matrixD list -> int
+
+val groups_fit : relationD list -> matrixD list -> bool
+
+val minus_one : dyadic
+
+val bent_of :
+  relationD list -> matrixD list -> dyadic list -> dyadic bent_layer list
+
+val pins_of :
+  int -> relationD list -> matrixD list -> dyadic list -> dyadic pin list
+
 val matrix_inequality :
-  rangeD list list -> matrixD list -> matrixD -> dyadic -> dyadic list ->
+  relationD list -> matrixD list -> matrixD -> dyadic -> dyadic list ->
   matrixD
 
 val shapes : int -> matrixD list -> matrixD -> bool
 
 val check :
-  rangeD list list -> matrixD list -> matrixD -> dyadic -> dyadic -> dyadic
+  relationD list -> matrixD list -> matrixD -> dyadic -> dyadic -> dyadic
   list -> factor -> bool
 
 type stack = matrixD list * matrixD
@@ -383,8 +425,8 @@ val set_stages :
 val outputs : matrixD list -> int -> int
 
 val check_parts :
-  rangeD list list -> stack -> stack list -> dyadic -> dyadic -> dyadic list
-  -> factor -> bool
+  relationD list -> stack -> stack list -> dyadic -> dyadic -> dyadic list ->
+  factor -> bool
 
 val count : bool list -> int
 
@@ -835,12 +877,37 @@ val divided_ranges : activation -> 'a1 list -> rangeD list
 
 val whole_ranges : activation -> 'a1 list -> rangeD list
 
-val ranges_by :
-  (activation -> matrixD -> rangeD list) -> part -> rangeD list list
+val relation_by :
+  (activation -> matrixD -> rangeD list) -> activation -> matrixD -> relationD
+
+val relations_by :
+  (activation -> matrixD -> rangeD list) -> part -> relationD list
 
 val relu_between : part -> bool
 
 val entrywise_between : part -> bool
+
+val chained : activation -> 'a1 list -> bool
+
+val chained_between : part -> bool
+
+val interleaved : 'a1 list -> 'a1 list -> 'a1 list
+
+val by_pairs : 'a1 list -> 'a1 list
+
+val turned : 'a1 list -> 'a1 list
+
+val turned_if : bool -> 'a1 list list -> 'a1 list list
+
+val regrouped_layers :
+  bool -> activation list -> layerD list -> layerD -> activation
+  list * (layerD list * layerD)
+
+val regrouped : part -> part
+
+val turns_fit : activation list -> layerD list -> layerD -> bool
+
+val may_regroup : part -> bool
 
 val parts_of : part list -> function0 -> part list
 
@@ -890,7 +957,7 @@ val ranges_centred :
 
 val ranges_on_box : part -> box -> rangeD list list
 
-val local_ranges : part list -> function0 -> box -> rangeD list list list
+val local_relations : part list -> function0 -> box -> relationD list list
 
 val undivided_matrices : part -> stack
 

@@ -23,3 +23,6 @@ let sorts activation = not (Proved.changes_numbers activation)
 let keeps = function Proved.Keeping _ -> true | _ -> false
 (* The width of a hidden layer is a multiple of it. *)
 let group = function Proved.Sorted (Groups k) -> k | Sorted (Halves | Pairs) -> 2 | _ -> 1
+(* How many multipliers a matrix inequality has for a layer: one for each number, or two for each group. *)
+let multipliers activation outputs =
+  if sorts activation then 2 * (outputs / group activation) else outputs

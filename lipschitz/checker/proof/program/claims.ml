@@ -44,18 +44,19 @@ let prove_unwritten state claim proof = prove_unwritten_by state claim (Seq.retu
 
 let prove state claim proof reason = prove_by state claim (Seq.return proof) reason
 
-(* The chain of matrices that a bound is about, and between which slopes the functions between them lie. *)
+(* The chain of matrices that a bound is about, and what is known of the functions between them. *)
 let stages state claim =
-  let joined f moves scale matrices =
+  let joined parts moves scale matrices =
     List.fold_left (fun (hidden, last) part -> let w, v = matrices part in Proved.set_stages hidden last w v)
-      ([], Proved.selector moves scale) (Proved.parts_of state.parts f) in
+      ([], Proved.selector moves scale) parts in
   match claim with
   | Proved.Norm_at_most (p, k, _) -> [], ([], Proved.matrix_at state.parts p k)
   | Slope_at_most (f, moves, scale, _) ->
-    List.concat_map (Proved.ranges_by Proved.divided_ranges) (Proved.parts_of state.parts f),
-    joined f moves scale Proved.matrices
+    let parts = List.map Proved.regrouped (Proved.parts_of state.parts f) in
+    List.concat_map (Proved.relations_by Proved.divided_ranges) parts, joined parts moves scale Proved.matrices
   | Slope_in_box (f, moves, scale, box, _) ->
-    List.concat (Proved.local_ranges state.parts f box), joined f moves scale Proved.undivided_matrices
+    List.concat (Proved.local_relations state.parts f box),
+    joined (Proved.parts_of state.parts f) moves scale Proved.undivided_matrices
   | _ -> assert false
 
 let not_checked state what = state.not_checked <- what :: state.not_checked
@@ -138,11 +139,13 @@ let function_of state = function
   | [ phi; rho ] -> Proved.Set_of (Functions.index state.net phi, Functions.index state.net rho)
   | _ -> assert false
 
-(* Neurons that an activation follows, where the last layer of phi and the first of rho are one. *)
+(* Multipliers of the neurons that an activation follows, where the last layer of phi and the first of rho are one: two
+   for each group of a layer that is sorted. *)
 let hidden_neurons state names =
-  let hidden part = List.fold_left
-      (fun n l -> n + Weights.outputs l) (- Weights.outputs (Weights.last_layer (Functions.weights state.net part)))
-      (Functions.weights state.net part).layers in
+  let hidden part =
+    let w = Functions.weights state.net part in
+    List.fold_left2 (fun n layer a -> n + Activation.multipliers a (Weights.outputs layer)) 0
+      (List.filteri (fun k _ -> k < List.length (Weights.between w)) w.layers) (Weights.between w) in
   List.fold_left (fun n part -> n + hidden part) 0 names
 
 let meaning state where bound names scale =
@@ -196,7 +199,7 @@ let check_activations state where bound names =
       if activation <> Proved.Relu then begin
         let of_ = " of a network with " ^ Activation.words activation in
         let by method_ = find where "upper_method" bound = Text method_ in
-        require (not (Activation.sorts activation) || by "product" || by "local_product")
+        require (not (Activation.sorts activation) || List.exists by [ "product"; "local_product"; "sdp" ])
           "%s: a bound from slopes of single numbers%s" where of_
       end) activations
 

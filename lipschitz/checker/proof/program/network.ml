@@ -123,6 +123,7 @@ let composition net name =
 let check_options json =
   let where = "network.options" in
   let lists = [ "order"; "phi_order"; "rho_order"; "select" ] and words = [ "key"; "activation" ] in
+  let words = if Json.has "normalization" json then "normalization" :: words else words in
   require_keys where (lists @ words) json;
   List.iter (fun key -> ignore (texts where (Json.find where key json))) lists;
   List.iter (fun key -> ignore (text where (Json.find where key json))) words

@@ -69,10 +69,49 @@ Definition is_zero (x : dyadic) : bool := fst x =? 0.
 (** Slopes of one neuron lie between these. *)
 Definition rangeD := (dyadic * dyadic)%type.
 Definition is_unit_range (r : rangeD) : bool := is_zero (fst r) && is_zero (add (snd r) (-1, 0)).
-(** `ranges`: of the neurons of each hidden layer. If all are [0, 1], the inputs are minimised out. *)
-Definition matrix_inequality (ranges : list (list rangeD)) (hidden : list matrixD) (last : matrixD) (rho : dyadic)
+(** What is known of each hidden layer. *)
+Definition relationD := relation dyadic.
+Definition is_unit_relation (r : relationD) : bool :=
+  match r with Each ranges => forallb is_unit_range ranges | Grouped _ _ => false end.
+Definition is_grouped (r : relationD) : bool := match r with Each _ => false | Grouped _ _ => true end.
+(** A multiplier for each number; for each group one of its distance, and then for each one of its sum. *)
+Definition multipliers_in (r : relationD) (m : matrixD) : nat :=
+  match r with Each _ => length m | Grouped n _ => (n + n)%nat end.
+Fixpoint multipliers_needed (rs : list relationD) (hidden : list matrixD) : nat :=
+  match rs, hidden with
+  | r :: rs', m :: hidden' => (multipliers_in r m + multipliers_needed rs' hidden')%nat
+  | [], m :: hidden' => (length m + multipliers_needed [] hidden')%nat
+  | _, [] => O
+  end.
+Fixpoint groups_fit (rs : list relationD) (hidden : list matrixD) : bool :=
+  match rs, hidden with
+  | Grouped n k :: rs', m :: hidden' => (length m =? n * k)%nat && groups_fit rs' hidden'
+  | _ :: rs', _ :: hidden' => groups_fit rs' hidden'
+  | _, _ => true
+  end.
+Definition minus_one : dyadic := (-1, 0).
+Fixpoint bent_of (rs : list relationD) (hidden : list matrixD) (t : list dyadic) : list bent_layer :=
+  match rs, hidden with
+  | r :: rs', m :: hidden' =>
+      match r with
+      | Each ranges => (ranges, firstn (length m) t, m)
+      | Grouped n k => (repeat (minus_one, (1, 0)) (n * k), spread k (firstn n t), m)
+      end :: bent_of rs' hidden' (skipn (multipliers_in r m) t)
+  | _, _ => []
+  end.
+Fixpoint pins_of (n : nat) (rs : list relationD) (hidden : list matrixD) (t : list dyadic) : list pin :=
+  match rs, hidden with
+  | r :: rs', m :: hidden' =>
+      match r with
+      | Each _ => ([], [], length m)
+      | Grouped g k => (firstn g (skipn g t), sum_rows zero add minus_one n O g k m, length m)
+      end :: pins_of (length m) rs' hidden' (skipn (multipliers_in r m) t)
+  | _, _ => []
+  end.
+(** If all slopes are in [0, 1], the inputs are minimised out. *)
+Definition matrix_inequality (rs : list relationD) (hidden : list matrixD) (last : matrixD) (rho : dyadic)
     (t : list dyadic) : matrixD :=
-  if forallb (forallb is_unit_range) ranges then
+  if forallb is_unit_relation rs then
     match hidden with
     | [] =>
         let n := length (hd [] last) in
@@ -82,8 +121,9 @@ Definition matrix_inequality (ranges : list (list rangeD)) (hidden : list matrix
           (List.combine (split (skipn (length first) t) later) later) last
     end
   else
-    bent_lmi zero add mul (1, 1) (-1, 0) (repeat (shift (-1) rho) (inputs hidden last))
-      (List.combine (List.combine ranges (split t hidden)) hidden) last.
+    let n := inputs hidden last in
+    let bent := bent_lmi zero add mul (1, 1) (-1, 0) (repeat (shift (-1) rho) n) (bent_of rs hidden t) last in
+    if existsb is_grouped rs then sum add bent (pins zero add mul n (pins_of n rs hidden t)) else bent.
 (** Every row as long as the stage before it has rows; the first stage takes n inputs. *)
 Fixpoint shapes (n : nat) (hidden : list matrixD) (last : matrixD) : bool :=
   match hidden with
@@ -91,12 +131,12 @@ Fixpoint shapes (n : nat) (hidden : list matrixD) (last : matrixD) : bool :=
   | m :: hidden' => forallb (fun row => length row =? n)%nat m && shapes (length m) hidden' last
   end.
 (** Accepts |f(x) - f(x')| <= upper |x - x'| of the chain with these stages. *)
-Definition check (ranges : list (list rangeD)) (hidden : list matrixD) (last : matrixD) (upper rho : dyadic)
+Definition check (rs : list relationD) (hidden : list matrixD) (last : matrixD) (upper rho : dyadic)
     (t : list dyadic) (f : factor) : bool :=
-  shapes (inputs hidden last) hidden last &&
-  ((length t =? neurons hidden)%nat && forallb is_nonnegative t && is_positive rho && is_nonnegative upper
+  shapes (inputs hidden last) hidden last && groups_fit rs hidden &&
+  ((length t =? multipliers_needed rs hidden)%nat && forallb is_nonnegative t && is_positive rho && is_nonnegative upper
   && is_nonnegative (add (mul upper upper) (neg rho))
-  && shows_nonnegative (matrix_inequality ranges hidden last rho t) f).
+  && shows_nonnegative (matrix_inequality rs hidden last rho t) f).
 
 (** Meaning *)
 Open Scope R_scope.
@@ -266,7 +306,9 @@ Definition keeps_length (f : list R -> list R) := forall y, length (f y) = lengt
 Definition of_stage (m : matrixD) (k : (list R -> list R) * layer) := of_matrix m (snd k) /\ keeps_length (fst k).
 Definition instance (p : stack) (l : real_stack) := Forall2 of_stage (fst p) (fst l) /\ of_matrix (snd p) (snd l).
 Definition real_range (r : rangeD) : range := (real (fst r), real (snd r)).
-Definition real_ranges : list (list rangeD) -> list (list range) := map (map real_range).
+Definition real_relation (r : relationD) : relation R :=
+  match r with Each ranges => Each (map real_range ranges) | Grouped n k => Grouped n k end.
+Definition real_relations : list relationD -> list (relation R) := map real_relation.
 
 Lemma matrix_fits m l : of_matrix m l -> bias_fits l.
 Proof. intros [E H]. unfold bias_fits. now rewrite E, map_length. Qed.
@@ -279,30 +321,78 @@ Proof.
 Qed.
 Lemma is_zero_real x : is_zero x = true -> real x = 0.
 Proof. unfold is_zero, real. intros H. apply Z.eqb_eq in H. rewrite H. ring. Qed.
-Lemma unit_ranges ranges : forallb (forallb is_unit_range) ranges = true ->
-  Forall (Forall unit_range) (real_ranges ranges).
+Lemma unit_relations rs : forallb is_unit_relation rs = true -> Forall unit_relation (real_relations rs).
 Proof.
-  unfold real_ranges. intros H. rewrite forallb_forall in H. apply Forall_map, Forall_forall. intros r Hr.
-  specialize (H r Hr). rewrite forallb_forall in H. apply Forall_map, Forall_forall. intros [a b] Hi.
+  unfold real_relations. intros H. rewrite forallb_forall in H. apply Forall_map, Forall_forall. intros r Hr.
+  specialize (H r Hr). destruct r as [ranges|n k]; [|discriminate]. cbn in *. rewrite forallb_forall in H.
+  apply Forall_map, Forall_forall. intros [a b] Hi.
   apply H, andb_prop in Hi. destruct Hi as [Ha Hb]. apply is_zero_real in Ha, Hb. cbn [fst snd] in *.
   rewrite real_add in Hb. replace (real (-1, 0)%Z) with (-1) in Hb by (unfold real; simpl; ring).
   unfold unit_range, real_range. cbn [fst snd]. f_equal; lra.
 Qed.
-Lemma stages_bent ranges ms ks ts h h' : along ks (real_ranges ranges) h h' -> Forall2 of_stage ms ks ->
-  Forall2 fits (map realm ms) (map reals ts) ->
-  let bs := images real (List.combine (List.combine ranges ts) ms) in
-  Forall2 bent_as ks bs /\ map ranges_of bs = real_ranges ranges.
+Lemma unit_needs rs ms : forallb is_unit_relation rs = true -> multipliers_needed rs ms = neurons ms.
 Proof.
-  simpl. intros A M. revert ranges ts h h' A.
-  induction M as [|m [f [m' c]] ms ks Hm Hms IH]; intros [|r ranges] ts h h' A F; simpl in A; try contradiction;
+  revert ms. induction rs as [|r rs IH]; intros ms H.
+  - clear H. induction ms as [|m ms IH]; simpl in *; auto.
+  - apply andb_prop in H. destruct H as [Hr H]. destruct ms as [|m ms]; auto. simpl. rewrite IH by auto.
+    now destruct r.
+Qed.
+Lemma real_minus_one : real minus_one = -1. Proof. unfold real, minus_one. simpl. ring. Qed.
+Lemma real_spread k t : reals (spread k t) = spread k (reals t).
+Proof.
+  unfold spread. induction t as [|a t IH]; simpl; auto. rewrite map_app, IH. f_equal. clear.
+  induction k; simpl; congruence.
+Qed.
+Lemma nonnegative_firstn n t : Forall (fun x => is_nonnegative x = true) t -> Forall (Rle 0) (reals (firstn n t)).
+Proof.
+  intros H. apply Forall_map. rewrite <- (firstn_skipn n t) in H. apply Forall_app in H.
+  eapply Forall_impl; [|apply H]. intros. now apply real_nonnegative.
+Qed.
+Lemma stages_bent rs ms ks t h h' : along ks (real_relations rs) h h' -> Forall2 of_stage ms ks ->
+  groups_fit rs ms = true -> length t = multipliers_needed rs ms -> Forall (fun x => is_nonnegative x = true) t ->
+  let bs := images real (bent_of rs ms t) in Forall2 bent_as ks bs /\ Forall2 covers (real_relations rs) bs.
+Proof.
+  simpl. intros A M. revert rs t h h' A.
+  induction M as [|m [f [m' c]] ms ks Hm Hms IH]; intros [|r rs] t h h' A G L N; simpl in A; try contradiction;
     [split; constructor|].
-  destruct ts as [|t ts]; simpl in F; inversion F as [|? ? ? ? H F']; subst. destruct A as [_ A].
-  destruct (IH ranges ts _ _ A F') as [B E]. destruct Hm as [Hm _]. pose proof (matrix_fits _ _ Hm) as L.
-  destruct Hm as [Em _].
-  split; cbn [List.combine images map].
-  - constructor; [|exact B]. unfold bent_as, weights, multipliers_of. cbn [fst snd] in *. subst m'.
-    split; [exact L|]. split; [reflexivity|exact H].
-  - unfold real_ranges in *. cbn [map]. now rewrite <- E.
+  destruct A as [_ A]. destruct Hm as [Hm _]. pose proof (matrix_fits _ _ Hm) as B. destruct Hm as [Em _].
+  cbn [fst snd] in *. subst m'.
+  assert (groups_fit rs ms = true) as G' by (destruct r; cbn in G; [|apply andb_prop in G]; tauto).
+  simpl in L. destruct (IH rs (skipn (multipliers_in r m) t) _ _ A G') as [I J].
+  - rewrite skipn_length. lia.
+  - rewrite <- (firstn_skipn (multipliers_in r m) t) in N. now apply Forall_app in N.
+  - cbn [bent_of images map real_relations]. split; constructor; auto; destruct r as [ranges|n k];
+      cbn [multipliers_in] in L; unfold bent_as, fits, weights, multipliers_of, ranges_of; cbn [fst snd covers].
+    + repeat split; auto; [|now apply nonnegative_firstn]. rewrite !map_length, firstn_length. lia.
+    + cbn in G. apply andb_prop in G. destruct G as [G _]. apply Nat.eqb_eq in G. rewrite real_spread.
+      repeat split; auto; [|now apply spread_nonnegative, nonnegative_firstn].
+      rewrite length_spread, !map_length, firstn_length, Nat.min_l by lia. congruence.
+    + reflexivity.
+    + split.
+      * unfold image_of_ranges, ranges_of. cbn [fst snd]. generalize (n * k)%nat as i. intros i.
+        induction i as [|i IHi]; simpl; auto. rewrite IHi, real_minus_one. repeat f_equal.
+        unfold real. simpl. ring.
+      * exists (reals (firstn n t)). unfold multipliers_of. cbn [fst snd]. rewrite real_spread. repeat split.
+        -- rewrite map_length, firstn_length. lia.
+        -- now apply nonnegative_firstn.
+Qed.
+Lemma stages_pinned rs ms ks t n h h' : along ks (real_relations rs) h h' -> Forall2 of_stage ms ks ->
+  groups_fit rs ms = true -> length h = n -> length h' = n ->
+  pinned ks (images_of_pins real (pins_of n rs ms t)) h h'.
+Proof.
+  intros A M. revert rs t n h h' A.
+  induction M as [|m [f [m' c]] ms ks Hm Hms IH]; intros [|r rs] t n h h' A G L L'; simpl in A; try contradiction;
+    [exact Logic.I|].
+  destruct A as [Hf A]. destruct Hm as [Hm _]. pose proof (matrix_fits _ _ Hm) as B. destruct Hm as [Em Hc].
+  cbn [fst snd] in *. subst m'. unfold bias_fits in B. cbn [fst snd] in B.
+  assert (groups_fit rs ms = true) as G' by (destruct r; cbn in G; [|apply andb_prop in G]; tauto).
+  destruct (related_lengths _ _ _ _ _ Hf) as (_ & Lz & Lz').
+  rewrite length_affine, map_length in Lz, Lz' by auto.
+  specialize (IH rs (skipn (multipliers_in r m) t) (length m) _ _ A G' Lz Lz').
+  cbn [pins_of images_of_pins map pinned]. destruct r as [ranges|g k]; cbn [fst snd map]; repeat split; auto.
+  rewrite (f_sum_rows zero add 0 Rplus real real_zero real_add), real_minus_one.
+  assert (length (minus h h') = n) as Ld by (rewrite length_minus; congruence). rewrite <- Ld.
+  apply (sum_rows_vanish g k (realm m) (minus h h') []). destruct Hf as [_ Hf]. now rewrite minus_affine in Hf by auto.
 Qed.
 
 Lemma norm_bound upper rho f x x' : 0 <= upper -> rho <= upper * upper ->
@@ -313,23 +403,24 @@ Proof.
 Qed.
 
 (** (d) *)
-Theorem check_sound ranges hidden last upper rho t f : check ranges hidden last upper rho t f = true ->
+Theorem check_sound rs hidden last upper rho t f : check rs hidden last upper rho t f = true ->
   forall l, instance (hidden, last) l ->
   forall x x', length x = inputs hidden last -> length x' = inputs hidden last ->
-  along (fst l) (real_ranges ranges) x x' ->
+  along (fst l) (real_relations rs) x x' ->
   norm (minus (run l x) (run l x')) <= real upper * norm (minus x x').
 Proof.
   unfold check. intros H [ks [last' b]] [Hks Hb] x x' Hx Hx' A. simpl in Hks, Hb, A.
-  apply andb_prop in H. destruct H as [_ H]. repeat (apply andb_prop in H; destruct H as [H ?]).
+  apply andb_prop in H. destruct H as [G H]. apply andb_prop in G. destruct G as [_ G].
+    repeat (apply andb_prop in H; destruct H as [H ?]).
   apply Nat.eqb_eq in H. rename H into Hn, H0 into HP, H1 into Hur, H2 into Hu, H3 into Hrho, H4 into Ht.
   apply shows_nonnegative_sound in HP. apply real_nonnegative in Hu, Hur. apply real_positive in Hrho.
   rewrite real_add, real_mul, real_neg in Hur.
   pose proof (matrix_fits _ _ Hb) as Hl. destruct Hb as [E Hb]. simpl in E. subst last'.
   apply (norm_bound (real upper) (real rho) (run (ks, (realm last, b)))); [auto|lra|]. unfold run. simpl.
   assert (real (-1, 0)%Z = -1) as M by (unfold real; simpl; ring).
-  rewrite forallb_forall, <- Forall_forall in Ht. pose proof (split_fits t hidden Hn Ht) as F.
-  unfold matrix_inequality in HP. destruct (forallb _ ranges) eqn:Z.
-  - destruct (stages_fit _ _ Hks) as (B & W & _). apply unit_ranges in Z.
+  rewrite forallb_forall, <- Forall_forall in Ht. unfold matrix_inequality in HP. destruct (forallb _ rs) eqn:Z.
+  - rewrite (unit_needs _ _ Z) in Hn. pose proof (split_fits t hidden Hn Ht) as F.
+    destruct (stages_fit _ _ Hks) as (B & W & _). apply unit_relations in Z.
     destruct Hks as [|first [g [m c]] later ks [[E Hc] _] Hks]; simpl in HP.
     + rewrite real_norm_inequality in HP.
       destruct (length last <=? _)%nat.
@@ -338,19 +429,25 @@ Proof.
     + simpl in E, Hc. subst m. inversion B; subst. inversion W as [W']. inversion F; subst.
       rewrite (f_lmi zero add mul 0 Rplus Rmult real real_zero real_add real_mul), M, real_mul, real_neg in HP.
       replace (real (1, 1)%Z) with 2 in HP by (unfold real; simpl; ring).
-      destruct ranges as [|r ranges]; [contradiction|].
-      apply lmi_bounds with (r := map real_range r) (ranges := real_ranges ranges)
+      destruct rs as [|r rs]; [contradiction|].
+      apply lmi_bounds with (r := real_relation r) (ranges := real_relations rs)
         (t := reals (firstn (length first) t)) (ts := map reals (split (skipn (length first) t) later)); auto.
       * now rewrite W'.
       * rewrite W'. assert (forall ts (ms : list matrixD), pairs real (List.combine ts ms) =
           List.combine (map reals ts) (map realm ms)) as Q.
         { clear. induction ts as [|u ts IH]; intros [|m ms]; simpl; auto. now rewrite IH. }
         now rewrite Q in HP.
-  - rewrite (f_bent_lmi zero add mul 0 Rplus Rmult real real_zero real_add real_mul), M in HP.
-    replace (real (1, 1)%Z) with 2 in HP by (unfold real; simpl; ring).
-    assert (reals (repeat (shift (-1) rho) (inputs hidden last)) = repeat (real rho / 2) (inputs hidden last)) as Q.
-    { generalize (inputs hidden last). intros n. induction n as [|n IH]; simpl; auto. rewrite IH, real_shift.
-      f_equal. simpl. field. }
-    rewrite Q in HP. destruct (stages_bent _ _ _ _ _ _ A Hks F) as [B R].
-    eapply bent_lmi_bounds; eauto. now rewrite R.
+  - cbv zeta in HP. set (n := inputs hidden last) in *.
+    assert (forall p : matrixD, p = bent_lmi zero add mul (1, 1)%Z (-1, 0)%Z (repeat (shift (-1) rho) n)
+      (bent_of rs hidden t) last -> realm p = bent_lmiR 2 (-1) (repeat (real rho / 2) n)
+      (images real (bent_of rs hidden t)) (realm last)) as Q.
+    { intros p ->. rewrite (f_bent_lmi zero add mul 0 Rplus Rmult real real_zero real_add real_mul), M.
+      replace (real (1, 1)%Z) with 2 by (unfold real; simpl; ring). f_equal.
+      clear. induction n as [|n IH]; simpl; auto. rewrite IH, real_shift. f_equal. simpl. field. }
+    destruct (stages_bent _ _ _ _ _ _ A Hks G Hn Ht) as [B C].
+    destruct (existsb is_grouped rs).
+    + rewrite (f_sum add Rplus real real_add), (Q _ eq_refl),
+        (f_pins zero add mul 0 Rplus Rmult real real_zero real_add real_mul) in HP.
+      eapply pinned_lmi_bounds; eauto. now apply stages_pinned.
+    + rewrite (Q _ eq_refl) in HP. eapply bent_lmi_bounds; eauto.
 Qed.

@@ -61,10 +61,56 @@ Definition divided_ranges {A} (a : activation) (rows : list A) : list rangeD :=
   map (fun _ => divided_range (base a)) rows.
 Definition whole_ranges {A} (a : activation) (rows : list A) : list rangeD :=
   by_number (fun b _ => range_of b) (fun _ => kept_range) a rows.
-Definition ranges_by (ranges : activation -> matrixD -> list rangeD) (p : part) : list (list rangeD) :=
-  map (fun l => ranges (fst l) (fst (snd l))) (following (between p) (hidden p)).
+(** Of each hidden layer: what is sorted in groups is known by group. *)
+Definition relation_by (ranges : activation -> matrixD -> list rangeD) (a : activation) (rows : matrixD) : relationD :=
+  match a with Sorted (Groups k) => Grouped (length rows / k) k | _ => Each (ranges a rows) end.
+Definition relations_by (ranges : activation -> matrixD -> list rangeD) (p : part) : list relationD :=
+  map (fun l => relation_by ranges (fst l) (fst (snd l))) (following (between p) (hidden p)).
 Definition relu_between (p : part) : bool := forallb is_relu (between p).
 Definition entrywise_between (p : part) : bool := forallb changes_numbers (between p).
+(** Number by number, or sorted in groups that make up the layer. *)
+Definition chained {A} (a : activation) (rows : list A) : bool :=
+  match a with Sorted (Groups k) => (length rows =? length rows / k * k)%nat | _ => changes_numbers a end.
+Definition chained_between (p : part) : bool :=
+  forallb (fun l => chained (fst l) (fst (snd l))) (following (between p) (hidden p)).
+(** The same network where pairs are sorted side by side: of halves, rows of the layer in front change places, and of
+    halves and neighbours, columns of the layer behind. *)
+Fixpoint interleaved {A} (u v : list A) : list A :=
+  match u, v with a :: u', b :: v' => a :: b :: interleaved u' v' | _, _ => [] end.
+Definition by_pairs {A} (l : list A) : list A :=
+  let h := Nat.div2 (length l) in interleaved (firstn h l) (skipn h l).
+Definition turned {A} (row : list A) : list A :=
+  let h := Nat.div2 (length row) in interleaved (skipn h row) (firstn h row).
+Definition turned_if {A} (b : bool) (m : list (list A)) : list (list A) := if b then map turned m else m.
+Fixpoint regrouped_layers (turn : bool) (between : list activation) (hidden : list layerD) (last : layerD) :
+    list activation * (list layerD * layerD) :=
+  match hidden with
+  | [] => ([], ([], (turned_if turn (fst last), snd last)))
+  | (m, b) :: hidden' =>
+      let m' := turned_if turn m in
+      let '(a, l, is_turned) :=
+        match hd Relu between with
+        | Sorted Halves => (Sorted (Groups 2), (by_pairs m', by_pairs b), true)
+        | Sorted Pairs => (Sorted (Groups 2), (m', b), true)
+        | a => (a, (m', b), false)
+        end in
+      let rest := regrouped_layers is_turned (tl between) hidden' last in
+      (a :: fst rest, (l :: fst (snd rest), snd (snd rest)))
+  end.
+Definition regrouped (p : part) : part :=
+  let r := regrouped_layers false (between p) (hidden p) (outer p) in
+  Part (fst (snd r)) (snd (snd r)) (clamp p) (fst r).
+Fixpoint turns_fit (between : list activation) (hidden : list layerD) (last : layerD) : bool :=
+  match hidden with
+  | [] => true
+  | (m, _) :: hidden' =>
+      match hd Relu between with
+      | Sorted Halves | Sorted Pairs =>
+          Nat.even (length m) && forallb (fun r => length r =? length m)%nat (fst (hd last hidden'))
+      | _ => true
+      end && turns_fit (tl between) hidden' last
+  end.
+Definition may_regroup (p : part) : bool := fits_part p && turns_fit (between p) (hidden p) (outer p).
 Definition parts_of (ps : list part) (f : function) : list part :=
   match f with Alone p => [part_at ps p] | Set_of phi rho => [part_at ps phi; part_at ps rho] end.
 (** Every network's biases fit; rho has no clamp; `moves` and a scale that is stated have one entry per input. *)
@@ -73,9 +119,11 @@ Definition well_formed (ps : list part) (f : function) (moves : list bool) (scal
   && (length moves =? inputs_of (part_at ps (moved f)))%nat
   && positive_scale scale && (is_nil scale || (length scale =? length moves)%nat).
 Definition check_slope ps f moves scale u rho t factor : bool :=
-  well_formed ps f moves scale && forallb entrywise_between (parts_of ps f) && is_nonnegative u
-  && check_parts (flat_map (ranges_by divided_ranges) (parts_of ps f)) ([], selector moves scale)
-       (map matrices (parts_of ps f)) u rho t factor.
+  let qs := map regrouped ps in
+  forallb may_regroup (parts_of ps f)
+  && (well_formed qs f moves scale && forallb chained_between (parts_of qs f) && is_nonnegative u
+  && check_parts (flat_map (relations_by divided_ranges) (parts_of qs f)) ([], selector moves scale)
+       (map matrices (parts_of qs f)) u rho t factor).
 
 (** Slopes by products of norms that were accepted before. *)
 Fixpoint find_norm (accepted : list claim) (p layer : nat) : option dyadic :=
@@ -156,14 +204,14 @@ Definition ranges_on_box (p : part) (b : box) : list (list rangeD) :=
   let radius := radius_of c in
   ranges_centred radius (rounding_of radius) (between p) (hidden p) (inputs_known 0 c).
 (** Of each part. *)
-Definition local_ranges (ps : list part) (f : function) (b : box) : list (list (list rangeD)) :=
-  ranges_on_box (part_at ps (moved f)) b
-  :: match f with Alone _ => [] | Set_of _ rho => [ranges_by whole_ranges (part_at ps rho)] end.
+Definition local_relations (ps : list part) (f : function) (b : box) : list (list relationD) :=
+  map Each (ranges_on_box (part_at ps (moved f)) b)
+  :: match f with Alone _ => [] | Set_of _ rho => [relations_by whole_ranges (part_at ps rho)] end.
 Definition undivided_matrices (p : part) : stack := (map fst (hidden p), fst (outer p)).
 Definition check_local_slope ps f moves scale (b : box) u rho t factor : bool :=
   well_formed ps f moves scale && forallb entrywise_between (parts_of ps f)
   && is_nonnegative u
-  && check_parts (concat (local_ranges ps f b)) ([], selector moves scale) (map undivided_matrices (parts_of ps f)) u
+  && check_parts (concat (local_relations ps f b)) ([], selector moves scale) (map undivided_matrices (parts_of ps f)) u
        rho t factor.
 
 (** Slopes in a box, part by part. *)

@@ -30,16 +30,35 @@ Fixpoint increments_within (ranges : list range) (y y' z z' : list R) : Prop :=
   | [], [], [], [], [] => True
   | _, _, _, _, _ => False
   end.
+(** Of n groups of k numbers each: a group comes no further apart than what enters it, and keeps its sum. *)
+Definition total (u : list R) : R := fold_right Rplus 0 u.
+Fixpoint groups_within (n k : nat) (dy dz : list R) : Prop :=
+  match n with
+  | O => dy = [] /\ dz = []
+  | S n' =>
+      length (firstn k dy) = k /\ length (firstn k dz) = k /\ square (firstn k dz) <= square (firstn k dy)
+      /\ total (firstn k dz) = total (firstn k dy) /\ groups_within n' k (skipn k dy) (skipn k dz)
+  end.
+(** What is known of a layer: of each number by itself, or of n groups of k. *)
+Inductive relation {T : Type} := Each (ranges : list (T * T)) | Grouped (n k : nat).
+Arguments relation : clear implicits.
+Definition related (r : relation R) (y y' z z' : list R) : Prop :=
+  match r with
+  | Each ranges => increments_within ranges y y' z z'
+  | Grouped n k => (length y = n * k /\ length y' = n * k /\ length z = n * k /\ length z' = n * k)%nat
+      /\ groups_within n k (minus y y') (minus z z')
+  end.
 (** The same of all hidden layers, from what enters the first. *)
-Fixpoint along (hidden : list ((list R -> list R) * layer)) (ranges : list (list range)) (h h' : list R) : Prop :=
-  match hidden, ranges with
-  | (f, (m, b)) :: hidden', r :: ranges' =>
+Fixpoint along (hidden : list ((list R -> list R) * layer)) (rs : list (relation R)) (h h' : list R) : Prop :=
+  match hidden, rs with
+  | (f, (m, b)) :: hidden', r :: rs' =>
       let y := affine m b h in let y' := affine m b h' in
-      increments_within r y y' (f y) (f y') /\ along hidden' ranges' (f y) (f y')
+      related r y y' (f y) (f y') /\ along hidden' rs' (f y) (f y')
   | [], [] => True
   | _, _ => False
   end.
 Definition unit_range (r : range) := r = (0, 1).
+Definition unit_relation (r : relation R) := match r with Each ranges => Forall unit_range ranges | _ => False end.
 
 Lemma minus_affine m b x x' : length b = length m -> minus (affine m b x) (affine m b x') = applyR m (minus x x').
 Proof.
@@ -66,6 +85,13 @@ Lemma increments_lengths r y y' z z' : increments_within r y y' z z' ->
 Proof.
   revert y y' z z'. induction r as [|a r IH]; intros [|u y] [|u' y'] [|w z] [|w' z']; simpl; try tauto.
   intros [_ H]. destruct (IH y y' z z' H) as (? & ? & ? & ?). repeat split; lia.
+Qed.
+Lemma related_lengths r y y' z z' : related r y y' z z' ->
+  length y' = length y /\ length z = length y /\ length z' = length y.
+Proof.
+  destruct r as [r|n k]; simpl.
+  - intros H. apply increments_lengths in H. intuition congruence.
+  - intuition congruence.
 Qed.
 Lemma increments_app r s y y' z z' v v' w w' : increments_within r y y' z z' -> increments_within s v v' w w' ->
   increments_within (r ++ s) (y ++ v) (y' ++ v') (z ++ w) (z' ++ w').
@@ -94,6 +120,41 @@ Proof.
   pose proof (Rmult_le_pos _ _ Hc S). simpl in *. nra.
 Qed.
 
+Lemma unit_constraint r t y y' z z' : related r y y' z z' -> unit_relation r -> Forall (Rle 0) t ->
+  let dz := minus z z' in dotR dz (timesR t dz) <= dotR dz (timesR t (minus y y')).
+Proof. destruct r as [r|n k]; simpl; [apply slope_constraint|tauto]. Qed.
+
+(** In groups, with one multiplier for each. *)
+Definition spread {T} (k : nat) (t : list T) : list T := flat_map (fun a => repeat a k) t.
+Lemma length_spread {T} k (t : list T) : length (spread k t) = (length t * k)%nat.
+Proof. unfold spread. induction t as [|a t IH]; simpl; auto. now rewrite app_length, repeat_length, IH. Qed.
+Lemma spread_nonnegative k t : Forall (Rle 0) t -> Forall (Rle 0) (spread k t).
+Proof.
+  intros H. induction H as [|a t Ha H IH]; simpl; [constructor|]. apply Forall_app. split; auto.
+  apply Forall_forall. intros b Hb. apply repeat_spec in Hb. now subst.
+Qed.
+Lemma dot_repeat a k u : length u = k -> dotR u (timesR (repeat a k) u) = a * square u.
+Proof.
+  unfold square. revert u. induction k as [|k IH]; intros [|b u]; simpl; try discriminate; intros H; [ring|].
+  rewrite IH by lia. ring.
+Qed.
+Lemma dot_times_app (u v t w : list R) : length t = length u ->
+  dotR (u ++ v) (timesR (t ++ w) (u ++ v)) = dotR u (timesR t u) + dotR v (timesR w v).
+Proof.
+  revert t. induction u as [|a u IH]; intros [|b t]; simpl; try discriminate; intros H; [ring|]. rewrite IH by lia.
+    ring.
+Qed.
+Lemma groups_constraint n k t dy dz : groups_within n k dy dz -> length t = n -> Forall (Rle 0) t ->
+  dotR dz (timesR (spread k t) dz) <= dotR dy (timesR (spread k t) dy).
+Proof.
+  revert t dy dz. induction n as [|n IH]; intros [|a t] dy dz; simpl; try discriminate; intros H L F.
+  - destruct H as [-> ->]. simpl. lra.
+  - destruct H as (Ly & Lz & Q & _ & H). inversion F as [|? ? Ha F']; subst.
+    specialize (IH t _ _ H ltac:(lia) F'). rewrite <- (firstn_skipn k dy), <- (firstn_skipn k dz).
+    rewrite !dot_times_app by (rewrite repeat_length; lia). rewrite !dot_repeat by auto.
+    pose proof (Rmult_le_compat_l _ _ _ Ha Q). lra.
+Qed.
+
 Definition fits (m : matrix) (t : list R) := length t = length m /\ Forall (Rle 0) t.
 
 Lemma times_scale a v w : timesR (scaleR a v) w = scaleR a (timesR v w).
@@ -106,7 +167,7 @@ Proof. revert m. induction t as [|a t IH]; intros [|r m]; simpl; try discriminat
 (** From the first hidden layer's activations h, h' on. *)
 Lemma later_layers rho t hidden ranges ts last b h h' :
   0 < rho -> length t = length h -> length h' = length h -> length b = length last ->
-  Forall (fun k => bias_fits (snd k)) hidden -> along hidden ranges h h' -> Forall (Forall unit_range) ranges ->
+  Forall (fun k => bias_fits (snd k)) hidden -> along hidden ranges h h' -> Forall unit_relation ranges ->
   Forall2 fits (map weights hidden) ts ->
   let dz := minus h h' in
   exists rest, form (bandR (2 * rho) (- rho) t (List.combine ts (map weights hidden)) last) (dz ++ rest) <=
@@ -123,7 +184,7 @@ Proof.
     inversion Hbs as [|? ? Hc Hbs']; inversion Hts as [|? t2 ? ts' [Ht2 Hp2] Hts']; inversion U as [|? ? U1 U2]; subst.
     unfold bias_fits, weights in *. simpl in *.
     set (z := f (affine m c h)) in *. set (z' := f (affine m c h')) in *.
-    destruct (increments_lengths _ _ _ _ _ Hf) as (Ly & _ & Lz & Lz'). rewrite length_affine in Ly by auto.
+    destruct (related_lengths _ _ _ _ _ Hf) as (_ & Lz & Lz'). rewrite length_affine in Lz, Lz' by auto.
     assert (length z = length m) as Hz by congruence. assert (length z' = length m) as Hz' by congruence.
     destruct (IH t2 ranges ts' z z') as [rest Hrest]; try congruence; auto.
     exists (minus z z' ++ rest).
@@ -132,7 +193,7 @@ Proof.
     rewrite dot_columns, (dot_comm (_ ++ _)), dot_app_short
       by (rewrite length_minus by congruence; unfold apply, scale_all; rewrite !map_length, length_scale_rows; lia).
     rewrite apply_scale_all, apply_scale_rows, dot_scale_l, (dot_comm _ (minus z z')), times_scale, dot_scale_r.
-    pose proof (slope_constraint r t2 _ _ _ _ Hf U1 Hp2) as C.
+    pose proof (unit_constraint r t2 _ _ _ _ Hf U1 Hp2) as C.
     cbv zeta in C. rewrite minus_affine in C by auto. simpl in C. nra.
 Qed.
 
@@ -146,7 +207,7 @@ Qed.
 
 Theorem lmi_bounds rho t f first b1 hidden r ranges ts last b x x' :
   0 < rho -> bias_fits (first, b1) -> Forall (fun k => bias_fits (snd k)) hidden -> bias_fits (last, b) ->
-  along ((f, (first, b1)) :: hidden) (r :: ranges) x x' -> Forall (Forall unit_range) (r :: ranges) ->
+  along ((f, (first, b1)) :: hidden) (r :: ranges) x x' -> Forall unit_relation (r :: ranges) ->
   fits first t -> Forall2 fits (map weights hidden) ts ->
   nonnegative (lmi 0 Rplus Rmult (-1) (2 * rho) (- rho) t first (List.combine ts (map weights hidden)) last) ->
   let g := network ((f, (first, b1)) :: hidden) (last, b) in
@@ -154,10 +215,10 @@ Theorem lmi_bounds rho t f first b1 hidden r ranges ts last b x x' :
 Proof.
   intros Hr H1 Hh Hl [Hf Hal] U [Ht Hp] Hts HP. inversion U as [|? ? U1 U2]; subst. simpl. unfold bias_fits in *.
   simpl in *. set (z := f (affine first b1 x)) in *. set (z' := f (affine first b1 x')) in *.
-  destruct (increments_lengths _ _ _ _ _ Hf) as (Ly & _ & Lz & Lz'). rewrite length_affine in Ly by auto.
+  destruct (related_lengths _ _ _ _ _ Hf) as (_ & Lz & Lz'). rewrite length_affine in Lz, Lz' by auto.
   assert (length z = length first) as Hz by congruence. assert (length z' = length first) as Hz' by congruence.
   destruct (later_layers rho t hidden ranges ts last b z z') as [rest Hrest]; try congruence; auto.
-  pose proof (slope_constraint r t _ _ _ _ Hf U1 Hp) as C.
+  pose proof (unit_constraint r t _ _ _ _ Hf U1 Hp) as C.
   cbv zeta in C. rewrite minus_affine in C by auto.
   specialize (HP (minus z z' ++ rest)). unfold lmi in HP. rewrite form_sum, form_scale, form_gram in HP.
   set (l := combine_rows _ _) in HP.

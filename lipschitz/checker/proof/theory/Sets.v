@@ -9,18 +9,18 @@ Definition set_stages (phi : list matrixD) (w : matrixD) (rho : list matrixD) (l
     matrixD :=
   match rho with [] => (phi, productD last w) | v :: rho' => (phi ++ productD v w :: rho', last) end.
 Definition outputs (hidden : list matrixD) (n : nat) : nat := length (List.last hidden (repeat [] n)).
-(** One function after the other: `p`, then each of `ps`, nothing but an added vector between them. `ranges`: of all
-  hidden layers. *)
-Fixpoint check_parts (ranges : list (list rangeD)) (p : stack) (ps : list stack) (upper r : dyadic) (t : list dyadic)
+(** One function after the other: `p`, then each of `ps`, nothing but an added vector between them. `rs`: of all hidden
+  layers. *)
+Fixpoint check_parts (rs : list relationD) (p : stack) (ps : list stack) (upper r : dyadic) (t : list dyadic)
     (f : factor) : bool :=
   match ps with
-  | [] => check ranges (fst p) (snd p) upper r t f
+  | [] => check rs (fst p) (snd p) upper r t f
   | q :: ps' =>
       let joined := set_stages (fst p) (snd p) (fst q) (snd q) in
       let n := inputs (fst p) (snd p) in
       (length (hd [] (snd p)) =? outputs (fst p) n)%nat && (inputs (fst joined) (snd joined) =? n)%nat
       && shapes n (fst p) (snd p) && shapes (length (snd p)) (fst q) (snd q)
-      && check_parts ranges joined ps' upper r t f
+      && check_parts rs joined ps' upper r t f
   end.
 
 Open Scope R_scope.
@@ -133,10 +133,10 @@ Qed.
 Fixpoint run_after (ks : list (list R * real_stack)) (y : list R) : list R :=
   match ks with [] => y | (s, k) :: ks' => run_after ks' (run k (plusR y s)) end.
 
-Fixpoint along_after (ks : list (list R * real_stack)) (rs : list (list (list rangeD))) (y y' : list R) : Prop :=
+Fixpoint along_after (ks : list (list R * real_stack)) (rs : list (list relationD)) (y y' : list R) : Prop :=
   match ks, rs with
   | (s, k) :: ks', r :: rs' =>
-      along (fst k) (real_ranges r) (plusR y s) (plusR y' s)
+      along (fst k) (real_relations r) (plusR y s) (plusR y' s)
       /\ along_after ks' rs' (run k (plusR y s)) (run k (plusR y' s))
   | [], [] => True
   | _, _ => False
@@ -145,7 +145,7 @@ Fixpoint along_after (ks : list (list R * real_stack)) (rs : list (list (list ra
 Theorem check_parts_sound r rs ps p upper rho t f : check_parts (r ++ concat rs) p ps upper rho t f = true ->
   forall l ks, instance p l -> Forall2 (fun q k => instance q (snd k)) ps ks ->
   forall x x', length x = inputs (fst p) (snd p) -> length x' = inputs (fst p) (snd p) ->
-  along (fst l) (real_ranges r) x x' -> along_after ks rs (run l x) (run l x') ->
+  along (fst l) (real_relations r) x x' -> along_after ks rs (run l x) (run l x') ->
   norm (minus (run_after ks (run l x)) (run_after ks (run l x'))) <= real upper * norm (minus x x').
 Proof.
   revert r rs p. induction ps as [|q ps IH]; intros r rs p H l ks Hl Hks x x' Hx Hx' A B;
@@ -156,5 +156,5 @@ Proof.
     destruct (run_join p l s k x Hl Hx HW) as [L E]. destruct (run_join p l s k x' Hl Hx' HW) as [L' E'].
     rewrite <- E, <- E' in *. rewrite app_assoc in HC.
     apply (IH _ _ _ HC (join l s k) ks'); eauto using instance_join; try congruence.
-    unfold real_ranges. rewrite map_app. destruct l as [phi [w b]], k as [hidden last]. now apply along_joined.
+    unfold real_relations. rewrite map_app. destruct l as [phi [w b]], k as [hidden last]. now apply along_joined.
 Qed.

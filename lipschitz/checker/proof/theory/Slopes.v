@@ -24,7 +24,8 @@ Proof.
   unfold run in B. simpl in B. rewrite minus_affine in B by (now rewrite map_length).
   rewrite <- (length_trim n d) in B at 2 4. rewrite minus_zeros in B.
   assert (is_nonnegative u = true /\ shapes n [] w = true) as [Hu Hs].
-  { unfold check in H. apply andb_prop in H. destruct H as [S H]. repeat both H. auto. }
+  { unfold check in H. apply andb_prop in H. destruct H as [S H]. apply andb_prop in S. destruct S as [S _].
+    repeat both H. auto. }
   rewrite apply_trim in B.
   - eapply Rle_trans; [exact B|]. apply Rmult_le_compat_l; [now apply real_nonnegative|]. apply norm_le, square_trim.
   - simpl in Hs. rewrite forallb_forall in Hs. apply Forall_forall. intros r Hr. apply in_map_iff in Hr.
@@ -46,13 +47,26 @@ Qed.
 Definition scaled_layer (b : list R) (l : layer) : layer := (map (timesR b) (fst l), snd l).
 Definition divided_by_number : activation -> list R -> list R :=
   by_number (fun b t => / real (unit_of b) * act b t) (fun t => t).
+(** Sorting in groups, where they make up the layer; `f` is of the other functions. *)
+Definition in_groups (f : activation -> list R -> list R) (a : activation) (y : list R) : list R :=
+  match a with
+  | Sorted (Groups k) =>
+      let n := (length y / k)%nat in if (length y =? n * k)%nat then groupsR n k y else y
+  | _ => f a y
+  end.
+Definition divided : activation -> list R -> list R := in_groups divided_by_number.
+Lemma in_groups_keep_length f a : (forall a, keeps_length (f a)) -> keeps_length (in_groups f a).
+Proof.
+  intros K y. destruct a as [| | | | | | | |[k| |]|]; simpl; auto; try apply K. destruct (Nat.eqb_spec (length y)
+    (length y / k * k)) as [E|]; auto. rewrite length_groups; auto.
+Qed.
 Fixpoint scaled_layers (b : list R) (between : list activation) (later : list layer) (last : layer) : real_stack :=
   match later with
   | [] => ([], scaled_layer b last)
   | l :: later' =>
       let a := hd Relu between in
       let rest := scaled_layers (reals (units a (fst l))) (tl between) later' last in
-      ((divided_by_number a, scaled_layer b l) :: fst rest, snd rest)
+      ((divided a, scaled_layer b l) :: fst rest, snd rest)
   end.
 Definition stack_of (p : part) : real_stack :=
   match hidden p with
@@ -61,16 +75,23 @@ Definition stack_of (p : part) : real_stack :=
       let a := hd Relu (between p) in
       let rest :=
         scaled_layers (reals (units a (fst first))) (tl (between p)) (map real_layer later) (real_layer (outer p)) in
-      ((divided_by_number a, real_layer first) :: fst rest, snd rest)
+      ((divided a, real_layer first) :: fst rest, snd rest)
   end.
 (** Without division. *)
 Definition whole_by_number : activation -> list R -> list R := by_number act (fun t => t).
+Definition whole : activation -> list R -> list R := in_groups whole_by_number.
 Definition functions_and_layers (between : list activation) (hidden : list layer) :
-    list ((list R -> list R) * layer) := map (fun l => (whole_by_number (fst l), snd l)) (following between hidden).
-Lemma whole_activated a y : changes_numbers a = true -> activated a y = whole_by_number a y.
+    list ((list R -> list R) * layer) := map (fun l => (whole (fst l), snd l)) (following between hidden).
+Lemma whole_activated {A} a (rows : list A) y : chained a rows = true -> length y = length rows ->
+  activated a y = whole a y.
 Proof.
-  revert y. induction a as [| | | | | | | |s|n a IH]; intros y H; try discriminate; try reflexivity.
-  unfold whole_by_number in *. cbn [activated by_number]. now rewrite IH, map_id.
+  assert (forall a y, changes_numbers a = true -> activated a y = whole_by_number a y) as W.
+  { clear. intros a y H. revert y. induction a as [| | | | | | | |s|n a IH]; intros y; try discriminate;
+    try reflexivity.
+    unfold whole_by_number in *. cbn [activated by_number]. now rewrite IH, map_id. }
+  intros H L. destruct a as [| | | | | | | |[k| |]|n a]; try discriminate; try reflexivity; cbn [chained] in H.
+  - unfold whole. cbn [in_groups activated]. rewrite L, H. apply Nat.eqb_eq in H. apply sort_groups. congruence.
+  - now apply W.
 Qed.
 Lemma units_map {A B} (f : A -> B) a l : units a (map f l) = units a l.
 Proof.
@@ -83,8 +104,17 @@ Proof. unfold affine. f_equal. simpl. unfold apply. rewrite map_map. apply map_e
 Lemma times_app u v x y : length u = length x -> timesR (u ++ v) (x ++ y) = timesR u x ++ timesR v y.
 Proof. revert x. induction u as [|a u IH]; intros [|b x]; simpl; try discriminate; auto. intros. rewrite IH; auto. Qed.
 Lemma times_divided {A} a (rows : list A) y : length y = length rows ->
-  timesR (reals (units a rows)) (divided_by_number a y) = whole_by_number a y.
+  timesR (reals (units a rows)) (divided a y) = whole a y.
 Proof.
+  assert (timesR (reals (units a rows)) (divided_by_number a y) = whole_by_number a y -> length y = length rows ->
+    timesR (reals (units a rows)) (divided a y) = whole a y) as G.
+  { intros E L. destruct a as [| | | | | | | |[k| |]|n a]; auto. unfold divided, whole. cbn [in_groups].
+    assert (forall u, length u = length rows -> timesR (reals (units (Sorted (Groups k)) rows)) u = u) as U.
+    { clear. unfold units. cbn [by_number]. induction rows as [|r rows IH]; intros [|c u]; simpl; try discriminate;
+      auto.
+      intros H. rewrite IH by lia. unfold unit_of. cbn [is_rising steepest]. rewrite real_one. f_equal. ring. }
+    apply U. destruct (Nat.eqb_spec (length y) (length y / k * k)) as [F|]; auto. rewrite length_groups; congruence. }
+  intros L. apply G; auto. revert L. clear G.
   assert (forall c (f : R -> R) (rows : list A) y, 0 < real c -> length y = length rows ->
     timesR (reals (map (fun _ => c) rows)) (map (fun t => / real c * f t) y) = map f y) as C.
   { clear. intros c f rows. induction rows as [|r rows IH]; intros [|t y]; simpl; try discriminate; auto.
@@ -111,16 +141,28 @@ Qed.
 Lemma entrywise_first between : forallb changes_numbers between = true ->
   changes_numbers (hd Relu between) = true /\ forallb changes_numbers (tl between) = true.
 Proof. destruct between; simpl; auto. intros H. now apply andb_prop in H. Qed.
-Lemma unclamped_network p x : entrywise_between p = true -> unclamped p x =
-  network (functions_and_layers (between p) (map real_layer (hidden p))) (real_layer (outer p)) x.
+Lemma entrywise_chained p : entrywise_between p = true -> chained_between p = true.
 Proof.
-  unfold entrywise_between, unclamped, functions_and_layers. generalize (between p) as s. revert x.
-  induction (map real_layer (hidden p)) as [|[m c] ls IH]; intros x s H; simpl; auto.
-  destruct (entrywise_first s H) as [E H']. now rewrite IH, whole_activated by auto.
+  unfold entrywise_between, chained_between. generalize (between p) as s.
+  induction (hidden p) as [|l ls IH]; intros s H; simpl; auto. destruct (entrywise_first s H) as [E H'].
+  rewrite IH by auto. destruct (hd Relu s) as [| | | | | | | |[k| |]|]; simpl in *; auto; try discriminate.
+  now rewrite E.
 Qed.
 Lemma fits_layer p l : fits_part p = true -> In l (layers p) -> length (snd l) = length (fst l).
 Proof. unfold fits_part. rewrite forallb_forall. intros H G. now apply Nat.eqb_eq, H. Qed.
-Lemma value_run p x : fits_part p = true -> entrywise_between p = true ->
+Lemma unclamped_network p x : fits_part p = true -> chained_between p = true -> unclamped p x =
+  network (functions_and_layers (between p) (map real_layer (hidden p))) (real_layer (outer p)) x.
+Proof.
+  intros F H. assert (forall l, In l (hidden p) -> length (snd l) = length (fst l)) as B
+    by (intros l I; apply (fits_layer p); auto; apply in_or_app; now left).
+  revert H. unfold chained_between, unclamped, functions_and_layers. generalize (between p) as s. revert x B.
+  induction (hidden p) as [|l ls IH]; intros x B s H; simpl; auto. simpl in H. apply andb_prop in H.
+    destruct H as [E H].
+  rewrite IH; auto; [|intros; apply B; now right]. f_equal.
+  apply (whole_activated _ (fst l)); auto. rewrite length_affine, map_length; auto.
+  rewrite !map_length. apply B. now left.
+Qed.
+Lemma value_run p x : fits_part p = true -> chained_between p = true ->
   value p x = run (stack_of p) (clamped (clamp p) x).
 Proof.
   intros F H. unfold value. rewrite unclamped_network by auto. unfold stack_of, functions_and_layers.
@@ -132,15 +174,10 @@ Proof.
   rewrite E in B. assert (Forall bias_fits (map real_layer later)) as Bl
     by (apply Forall_map, Forall_forall; intros l I; apply B; now right).
   pose proof (scaled_run (reals (units a m)) (tl (between p)) (map real_layer later) (real_layer (outer p))
-    (divided_by_number a (affine (fst (real_layer (m, c))) (snd (real_layer (m, c))) y)) Bl) as R.
+    (divided a (affine (fst (real_layer (m, c))) (snd (real_layer (m, c))) y)) Bl) as R.
   rewrite times_divided in R.
   - symmetry. exact R.
   - rewrite length_affine by (apply B; now left). simpl. apply map_length.
-Qed.
-Lemma relu_entrywise p : relu_between p = true -> entrywise_between p = true.
-Proof.
-  unfold relu_between, entrywise_between. rewrite !forallb_forall. intros H a Ha. specialize (H a Ha).
-  now destruct a.
 Qed.
 Lemma relu_part p : relu_between p = true -> all_relu p.
 Proof.
@@ -150,21 +187,31 @@ Qed.
 Lemma relu_network p x : relu_between p = true ->
   unclamped p x = network (relu_layers (hidden p)) (real_layer (outer p)) x.
 Proof.
-  intros H. rewrite unclamped_network by now apply relu_entrywise. f_equal. apply relu_part in H. unfold all_relu in H.
-  unfold functions_and_layers, relu_layers. generalize (between p) as s, H. clear H.
-  induction (hidden p) as [|l ls IH]; intros s H; simpl; auto. destruct H as [|a s <- H]; simpl; f_equal.
-  - apply IH. constructor.
-  - now apply IH.
+  intros H. apply relu_part in H. unfold all_relu in H. unfold unclamped, relu_layers. revert x H.
+  generalize (between p) as s.
+  induction (hidden p) as [|l ls IH]; intros s x H; simpl; auto.
+  destruct H as [|a s <- H]; simpl; apply IH; auto.
 Qed.
 (** Functions whose slopes lie in these ranges everywhere. *)
-Lemma along_everywhere hidden ranges x x' : Forall (fun k => bias_fits (snd k)) hidden ->
+Lemma along_everywhere hidden rs x x' : Forall (fun k => bias_fits (snd k)) hidden ->
   Forall2 (fun (k : (list R -> list R) * layer) r => forall y y', length y = length (weights k) ->
-    length y' = length (weights k) -> increments_within (map real_range r) y y' (fst k y) (fst k y')) hidden ranges ->
-  along hidden (real_ranges ranges) x x'.
+    length y' = length (weights k) -> related (real_relation r) y y' (fst k y) (fst k y')) hidden rs ->
+  along hidden (real_relations rs) x x'.
 Proof.
-  intros B H. revert x x'. induction H as [|[f [m c]] r hidden ranges S H IH]; intros x x'; cbn; auto.
+  intros B H. revert x x'. induction H as [|[f [m c]] r hidden rs S H IH]; intros x x'; cbn; auto.
   inversion B as [|? ? Bm B']; subst. unfold bias_fits, weights in *. cbn [fst snd] in *. split; auto.
   apply S; now apply length_affine.
+Qed.
+(** Sorted in groups, or by what is known of each number. *)
+Lemma related_in_groups {A} f ranges a (rows : list (list A)) (rowsD : matrixD) y y' :
+  length rows = length rowsD -> chained a rowsD = true -> length y = length rows -> length y' = length rows ->
+  (changes_numbers a = true -> increments_within (map real_range (ranges a rowsD)) y y' (f a y) (f a y')) ->
+  related (real_relation (relation_by ranges a rowsD)) y y' (in_groups f a y) (in_groups f a y').
+Proof.
+  intros E C L L' H. destruct a as [| | | | | | | |[k| |]|n a]; try discriminate; try (apply H; auto; fail).
+  cbn [chained] in C. cbn [relation_by real_relation related in_groups]. rewrite L, L', E, C. apply Nat.eqb_eq in C.
+  set (n := (length rowsD / k)%nat) in *. rewrite !length_groups by congruence. repeat split; try congruence.
+  apply groups_keep_sums; congruence.
 Qed.
 (** Number by number: of those that change, and of those that stay. *)
 Lemma increments_by_number {A} (f : activation -> R -> R) (g : activation -> A -> rangeD) (k : A -> rangeD)
@@ -200,7 +247,8 @@ Proof.
   { intros b l Hl. destruct (F l Hl) as [_ B]. unfold scale_columns. split; simpl in *.
     - rewrite !map_map. apply map_ext. intros r. symmetry. apply (f_times mul Rmult real real_mul).
     - now rewrite B, map_length. }
-  assert (forall a, keeps_length (divided_by_number a)) as K by (intros a y; apply length_by_number).
+  assert (forall a, keeps_length (divided a)) as K
+    by (intros a; apply in_groups_keep_length; intros b y; apply length_by_number).
   unfold matrices, stack_of, layers in *. destruct (hidden p) as [|first later]; simpl.
   - split; [constructor|]. apply F. now left.
   - assert (of_matrix (fst first) (real_layer first)) as F1 by (apply F; now left).
@@ -226,16 +274,27 @@ Proof.
     apply divided_range_holds.
   - intros _. apply divided_range_has_one.
 Qed.
-Lemma divided_along p x x' : fits_part p = true ->
-  along (fst (stack_of p)) (real_ranges (ranges_by divided_ranges p)) x x'.
+Lemma divided_along p x x' : fits_part p = true -> chained_between p = true ->
+  along (fst (stack_of p)) (real_relations (relations_by divided_ranges p)) x x'.
 Proof.
-  intros H. destruct (instance_matrices p H) as [I _].
+  intros H C. destruct (instance_matrices p H) as [I _].
   apply along_everywhere; [now apply (stages_fit (fst (matrices p)))|].
-  clear. unfold ranges_by, stack_of. destruct (hidden p) as [|first later]; [constructor|]. cbn.
-  constructor; [|generalize (reals (units (hd Relu (between p)) (fst first))) as b, (tl (between p)) as s;
-    induction later as [|l later IH]; intros b s; cbn; constructor; [|apply IH]];
-    cbn [fst snd weights scaled_layer real_layer]; intros y y' L L'; rewrite ?map_length in L, L';
-    now apply divided_increments.
+  revert C. clear. unfold relations_by, stack_of, chained_between.
+    destruct (hidden p) as [|first later]; [constructor|].
+  cbn. intros C. apply andb_prop in C. destruct C as [C1 C].
+  assert (forall a (l : layerD) y y', chained a (fst l) = true -> length y = length (fst l) -> length y' = length
+    (fst l)
+    -> related (real_relation (relation_by divided_ranges a (fst l))) y y' (divided a y) (divided a y')) as G.
+  { clear. intros a l y y' C L L'. apply (related_in_groups _ _ a (fst l)); auto.
+    intros _. now apply divided_increments. }
+  constructor.
+  - cbn [fst snd weights real_layer]. intros y y' L L'. rewrite map_length in L, L'. now apply G.
+  - revert C. generalize (reals (units (hd Relu (between p)) (fst first))) as b, (tl (between p)) as s.
+    clear C1. induction later as [|l later IH]; intros b s C; cbn in C |- *; constructor.
+    + cbn [fst snd weights scaled_layer real_layer]. intros y y' L L'. rewrite !map_length in L, L'.
+      apply andb_prop in C.
+      now apply G.
+    + apply andb_prop in C. now apply IH.
 Qed.
 Lemma length_value p x : fits_part p = true -> length (value p x) = length (fst (outer p)).
 Proof.
@@ -271,10 +330,10 @@ Definition stacks_of ps (f : function) (rest : list R) (of_part : part -> real_s
   end.
 Lemma chain_sound ps f moves scale u rho t factor (matrices_of : part -> stack) (of_part : part -> real_stack) ranges
     rest x y :
-  well_formed ps f moves scale = true -> forallb entrywise_between (parts_of ps f) = true -> is_nonnegative u = true ->
+  well_formed ps f moves scale = true -> forallb chained_between (parts_of ps f) = true -> is_nonnegative u = true ->
   check_parts (concat ranges) ([], selector moves scale) (map matrices_of (parts_of ps f)) u rho t factor = true ->
   (forall p, fits_part p = true -> instance (matrices_of p) (of_part p)) ->
-  (forall p z, fits_part p = true -> entrywise_between p = true ->
+  (forall p z, fits_part p = true -> chained_between p = true ->
     value p z = run (of_part p) (clamped (clamp p) z)) ->
   agree moves x y -> let c := clamped (clamp (part_at ps (moved f))) in
   along_after (stacks_of ps f rest of_part) ranges (c x) (c y) ->
@@ -305,15 +364,185 @@ Proof.
     fold S in Ex, Ey. rewrite !E1, Ex, Ey in B. cbn [run_after] in B. rewrite !plus_nil_r in B.
     apply B; auto; first [congruence|exact Logic.I].
 Qed.
+(** Pairs side by side *)
+Lemma map_interleaved {A B} (g : A -> B) u v : map g (interleaved u v) = interleaved (map g u) (map g v).
+Proof. revert v. induction u as [|a u IH]; intros [|b v]; simpl; auto. now rewrite IH. Qed.
+Lemma map_by_pairs {A B} (g : A -> B) l : map g (by_pairs l) = by_pairs (map g l).
+Proof. unfold by_pairs. now rewrite map_interleaved, map_length, firstn_map, skipn_map. Qed.
+Lemma map_turned {A B} (g : A -> B) l : map g (turned l) = turned (map g l).
+Proof. unfold turned. now rewrite map_interleaved, map_length, firstn_map, skipn_map. Qed.
+Lemma realm_turned_if b m : realm (turned_if b m) = turned_if b (realm m).
+Proof. destruct b; simpl; auto. rewrite !map_map. apply map_ext. intros. apply map_turned. Qed.
+Lemma length_interleaved {A} (u v : list A) : length u = length v -> length (interleaved u v) = (length u * 2)%nat.
+Proof. revert v. induction u as [|a u IH]; intros [|b v]; simpl; try discriminate; auto. Qed.
+Lemma dot_interleaved u v p q : length u = length v -> length p = length u -> length q = length u ->
+  dotR (interleaved u v) (interleaved p q) = dotR u p + dotR v q.
+Proof.
+  revert v p q. induction u as [|a u IH]; intros [|b v] [|c p] [|d q]; simpl; try discriminate; intros; [ring|].
+  rewrite IH by lia. ring.
+Qed.
+Lemma plus_interleaved u v p q : length u = length v -> length p = length u -> length q = length u ->
+  plusR (interleaved u v) (interleaved p q) = interleaved (plusR u p) (plusR v q).
+Proof.
+  revert v p q. induction u as [|a u IH]; intros [|b v] [|c p] [|d q]; simpl; try discriminate; intros; auto.
+  now rewrite IH by lia.
+Qed.
+Lemma half_lengths {A} (l : list A) : Nat.even (length l) = true ->
+  length (firstn (Nat.div2 (length l)) l) = Nat.div2 (length l) /\
+  length (skipn (Nat.div2 (length l)) l) = Nat.div2 (length l).
+Proof.
+  intros H. apply Nat.even_spec in H. destruct H as [h H]. rewrite H, Nat.div2_double, firstn_length, skipn_length.
+  lia.
+Qed.
+Lemma dot_turned r u v : length u = length v -> length r = (length u + length v)%nat ->
+  dotR (turned r) (interleaved v u) = dotR r (u ++ v).
+Proof.
+  intros E L. assert (length r = 2 * length u)%nat as L2 by lia. unfold turned. rewrite L2, Nat.div2_double.
+  assert (length (firstn (length u) r) = length u) as F by (rewrite firstn_length; lia).
+  assert (length (skipn (length u) r) = length u) as S by (rewrite skipn_length; lia).
+  rewrite dot_interleaved by congruence. rewrite <- (firstn_skipn (length u) r) at 3.
+  rewrite dot_app by auto. ring.
+Qed.
+Lemma apply_turned m u v : length u = length v -> Forall (fun r => length r = (length u + length v)%nat) m ->
+  applyR (map turned m) (interleaved v u) = applyR m (u ++ v).
+Proof.
+  intros E H. unfold apply. rewrite map_map. induction H as [|r m L H IH]; simpl; auto.
+  now rewrite IH, dot_turned.
+Qed.
+Lemma affine_by_pairs m b x : length b = length m -> Nat.even (length m) = true ->
+  affine (by_pairs m) (by_pairs b) x = by_pairs (affine m b x).
+Proof.
+  intros E H. unfold affine. assert (applyR (by_pairs m) x = by_pairs (applyR m x)) as -> by apply map_by_pairs.
+  assert (length (applyR m x) = length m) as L by apply map_length.
+  assert (length (plusR (applyR m x) b) = length m) as Lp by (apply (length_affine m b x E)).
+  unfold by_pairs. rewrite L, E, Lp. set (h := Nat.div2 (length m)).
+  assert (forall (l : list R), length l = length m -> length (firstn h l) = h /\ length (skipn h l) = h) as F.
+  { intros l Hl. unfold h. rewrite <- Hl. apply half_lengths. now rewrite Hl. }
+  destruct (F _ L), (F b E). rewrite plus_interleaved by congruence.
+  assert (forall k u v, length u = length v -> plusR (firstn k u) (firstn k v) = firstn k (plusR u v)
+    /\ plusR (skipn k u) (skipn k v) = skipn k (plusR u v)) as P.
+  { clear. induction k as [|k IH]; intros [|a u] [|c v]; simpl; try discriminate; auto. intros N.
+    destruct (IH u v ltac:(lia)) as [-> ->]. auto. }
+  destruct (P h (applyR m x) b ltac:(congruence)) as [-> ->]. reflexivity.
+Qed.
+Lemma sorted_pairs u v : length u = length v ->
+  sort_layer (Groups 2) (interleaved u v) = interleaved (both Rmin u v) (both Rmax u v).
+Proof.
+  intros E. rewrite (sort_groups (length u)) by now rewrite length_interleaved.
+  revert v E. induction u as [|a u IH]; intros [|b v]; simpl; try discriminate; auto. intros E.
+  unfold both in *. simpl. rewrite IH by lia. reflexivity.
+Qed.
+Lemma even_interleaved (y : list R) : Nat.even (length y) = true -> exists u v, length u = length v /\
+  y = interleaved u v.
+Proof.
+  assert (forall n (y : list R), (length y <= n)%nat -> Nat.even (length y) = true -> exists u v, length u = length v /\
+    y = interleaved u v) as G.
+  { clear. induction n as [|n IH]; intros [|a [|b y]]; simpl; intros L H; try discriminate; try lia;
+      try (exists [], []; now split).
+    destruct (IH y ltac:(lia) H) as (u & v & E & ->). exists (a :: u), (b :: v). simpl. split; auto. }
+  intros H. apply (G (length y)); auto.
+Qed.
+Lemma pairs_of_interleaved f (u v : list R) : length u = length v -> of_pairs f (interleaved u v) = both f u v.
+Proof. revert v. induction u as [|a u IH]; intros [|b v]; simpl; try discriminate; auto. intros. unfold both in *.
+  simpl.
+  now rewrite IH by lia. Qed.
+(** What leaves sorted pairs, and the same numbers in their other places. *)
+Definition turned_into (turn : bool) (x x' : list R) : Prop :=
+  if turn then exists u v, length u = length v /\ x = u ++ v /\ x' = interleaved v u else x = x'.
+Lemma affine_turned turn (l : layerD) x x' : turned_into turn x x' ->
+  (turn = true -> Forall (fun r => length r = length x) (fst l)) ->
+  affine (turned_if turn (realm (fst l))) (reals (snd l)) x' = affine (realm (fst l)) (reals (snd l)) x.
+Proof.
+  destruct turn; simpl; [|now intros -> _]. intros (u & v & E & -> & ->) H. unfold affine. f_equal.
+  apply apply_turned; auto. apply Forall_map. eapply Forall_impl; [|apply H; auto]. cbn. intros r L.
+  now rewrite map_length, L, app_length.
+Qed.
+Lemma regrouped_value turn between hidden last x x' :
+  Forall (fun l : layerD => length (snd l) = length (fst l)) hidden -> turns_fit between hidden last = true ->
+  turned_into turn x x' -> (turn = true -> Forall (fun r => length r = length x) (fst (hd last hidden))) ->
+  let r := regrouped_layers turn between hidden last in
+  layer_by_layer (fst r) (map real_layer (fst (snd r))) (real_layer (snd (snd r))) x' =
+  layer_by_layer between (map real_layer hidden) (real_layer last) x.
+Proof.
+  revert turn between x x'. induction hidden as [|[m b] hidden IH]; intros turn between x x' B T X S; cbv zeta.
+  - cbn. rewrite realm_turned_if. now apply affine_turned.
+  - inversion B as [|? ? Bm B']; subst. cbn [fst snd] in Bm. cbn [hd] in S.
+    set (y := affine (realm m) (reals b) x).
+    assert (affine (realm (turned_if turn m)) (reals b) x' = y) as Y
+      by (rewrite realm_turned_if; now apply (affine_turned turn (m, b))).
+    assert (length y = length m) as Ly by (unfold y; rewrite length_affine; rewrite !map_length; auto).
+    cbn [turns_fit] in T. apply andb_prop in T. destruct T as [T T'].
+    assert (Nat.even (length m) = true ->
+      affine (realm (by_pairs (turned_if turn m))) (reals (by_pairs b)) x' = by_pairs y) as P.
+    { intros V. rewrite <- Y, !map_by_pairs.
+      assert (length (turned_if turn m) = length m) as Lm by (destruct turn; simpl; auto using map_length).
+      apply affine_by_pairs; rewrite !map_length; congruence. }
+    assert (forall a, regrouped_layers turn between ((m, b) :: hidden) last =
+      (let rest := regrouped_layers false (tl between) hidden last in
+       (a :: fst rest, ((turned_if turn m, b) :: fst (snd rest), snd (snd rest)))) -> hd Relu between = a ->
+      let r := regrouped_layers turn between ((m, b) :: hidden) last in
+      layer_by_layer (fst r) (map real_layer (fst (snd r))) (real_layer (snd (snd r))) x' =
+      layer_by_layer between (map real_layer ((m, b) :: hidden)) (real_layer last) x) as Same.
+    { intros a -> E. cbv zeta. cbn [fst snd map layer_by_layer hd tl real_layer]. rewrite Y, E. fold y.
+      apply IH; auto; [reflexivity|discriminate]. }
+    assert (forall s rows bias, (Sorted s = hd Relu between) -> affine (realm rows) (reals bias) x' =
+        match s with Halves => by_pairs y | _ => y end -> s = Halves \/ s = Pairs ->
+      Nat.even (length m) = true -> Forall (fun r => length r = length m) (fst (hd last hidden)) ->
+      let rest := regrouped_layers true (tl between) hidden last in
+      layer_by_layer (Sorted (Groups 2) :: fst rest) (map real_layer ((rows, bias) :: fst (snd rest)))
+        (real_layer (snd (snd rest))) x' =
+      layer_by_layer between (map real_layer ((m, b) :: hidden)) (real_layer last) x) as Paired.
+    { intros s rows bias E R HP V F. cbv zeta. cbn [fst snd map layer_by_layer hd tl real_layer]. rewrite R, <- E.
+      fold y.
+      cbn [activated].
+      assert (exists u v, length u = length v /\ (length u + length v = length y)%nat
+        /\ sort_layer s y = both Rmax u v ++ both Rmin u v
+        /\ match s with Halves => by_pairs y | _ => y end = interleaved u v) as (u & v & L & N & Q & ->).
+      { rewrite <- Ly in V. destruct HP as [->| ->].
+        - destruct (half_lengths y V) as [H1 H2].
+          exists (firstn (Nat.div2 (length y)) y), (skipn (Nat.div2 (length y)) y). split; [congruence|].
+          split; [now rewrite <- app_length, firstn_skipn|now split].
+        - destruct (even_interleaved y V) as (u & v & L & ->). exists u, v. split; auto.
+          split; [rewrite length_interleaved; lia|]. split; auto.
+          unfold sort_layer. cbn [sorted_by]. now rewrite !pairs_of_interleaved. }
+      rewrite Q, sorted_pairs by auto.
+      assert (length (both Rmax u v) = length u) as L1 by (rewrite length_both; lia).
+      assert (length (both Rmin u v) = length u) as L2 by (rewrite length_both; lia).
+      apply IH; auto.
+      - exists (both Rmax u v), (both Rmin u v). split; [congruence|]. now split.
+      - intros _. eapply Forall_impl; [|exact F]. cbn. intros r ->. rewrite app_length, L1, L2, <- Ly.
+        lia. }
+    destruct (hd Relu between) as [| | | | | | | |[k| |]|n a] eqn:E;
+      try (eapply Same; [cbn [regrouped_layers]; rewrite E; reflexivity|reflexivity]).
+    + apply andb_prop in T. destruct T as [V F]. rewrite forallb_forall in F. cbn [regrouped_layers]. rewrite E.
+      apply (Paired Halves); auto. apply Forall_forall. intros r Hr. apply Nat.eqb_eq. auto.
+    + apply andb_prop in T. destruct T as [V F]. rewrite forallb_forall in F. cbn [regrouped_layers]. rewrite E.
+      apply (Paired Pairs); auto. apply Forall_forall. intros r Hr. apply Nat.eqb_eq. auto.
+Qed.
+Lemma value_regrouped p x : may_regroup p = true -> value (regrouped p) x = value p x.
+Proof.
+  unfold may_regroup. intros H. apply andb_prop in H. destruct H as [F T]. unfold value, unclamped, regrouped.
+  cbn [between hidden outer clamp]. apply regrouped_value; auto; [|reflexivity|discriminate].
+  apply Forall_forall. intros l I. apply (fits_layer p); auto. apply in_or_app. now left.
+Qed.
+Lemma part_regrouped ps k : part_at (map regrouped ps) k = regrouped (part_at ps k).
+Proof. unfold part_at. now rewrite <- (map_nth regrouped). Qed.
 Lemma slope_sound ps f moves scale u rho t factor :
   check_slope ps f moves scale u rho t factor = true -> holds ps (Slope_at_most f moves scale u).
 Proof.
-  unfold check_slope. intros H rest x y Ha _. do 3 both H. rewrite flat_map_concat_map in H0.
-  apply (chain_sound ps f moves scale u rho t factor matrices stack_of _ rest x y H H2 H1 H0 instance_matrices
+  unfold check_slope. intros H rest x y Ha _. apply andb_prop in H. destruct H as [G H].
+  set (qs := map regrouped ps) in *. do 3 both H. rewrite flat_map_concat_map in H0.
+  assert (forall z, value_of qs f rest z = value_of ps f rest z) as V.
+  { intros z. unfold qs. destruct f as [p|phi k]; cbn [parts_of forallb value_of] in *; rewrite !part_regrouped.
+    - apply andb_prop in G. now apply value_regrouped.
+    - apply andb_prop in G. destruct G as [G1 G2]. apply andb_prop in G2. now rewrite !value_regrouped. }
+  rewrite <- !V.
+  apply (chain_sound qs f moves scale u rho t factor matrices stack_of _ rest x y H H2 H1 H0 instance_matrices
     value_run Ha).
   unfold well_formed in H. do 4 both H. destruct f as [p|phi k]; cbn in *.
-  - both H. split; auto. now apply divided_along.
-  - both H. both H7. split; [now apply divided_along|]. split; auto. now apply divided_along.
+  - apply andb_prop in H, H2. split; auto. now apply divided_along.
+  - apply andb_prop in H, H2. destruct H as [F1 F2], H2 as [C1 C2]. apply andb_prop in F2, C2.
+    split; [now apply divided_along|]. split; auto. now apply divided_along.
 Qed.
 
 (** Slopes by products of norms *)
@@ -623,9 +852,9 @@ Qed.
 (** By a matrix inequality with these slopes *)
 Definition undivided_stack (p : part) : real_stack :=
   (functions_and_layers (between p) (map real_layer (hidden p)), real_layer (outer p)).
-Lemma undivided_value p x : fits_part p = true -> entrywise_between p = true ->
+Lemma undivided_value p x : fits_part p = true -> chained_between p = true ->
   value p x = run (undivided_stack p) (clamped (clamp p) x).
-Proof. intros _ H. unfold value. now rewrite unclamped_network. Qed.
+Proof. intros F H. unfold value. now rewrite unclamped_network. Qed.
 Lemma undivided_instance p : fits_part p = true -> instance (undivided_matrices p) (undivided_stack p).
 Proof.
   intros H. assert (forall l, In l (layers p) -> of_matrix (fst l) (real_layer l)) as F.
@@ -635,21 +864,24 @@ Proof.
   assert (forall l, In l (hidden p) -> of_matrix (fst l) (real_layer l)) as G
     by (intros; apply F; unfold layers; apply in_or_app; now left).
   clear F. generalize (between p) as s. induction (hidden p) as [|l ls IH]; intros s; cbn; constructor.
-  - split; [apply G; now left|intros y; apply length_by_number].
+  - split; [apply G; now left|]. apply in_groups_keep_length. intros a y. apply length_by_number.
   - apply IH. intros. apply G. now right.
 Qed.
-Lemma undivided_along p x x' : fits_part p = true ->
-  along (fst (undivided_stack p)) (real_ranges (ranges_by whole_ranges p)) x x'.
+Lemma undivided_along p x x' : fits_part p = true -> chained_between p = true ->
+  along (fst (undivided_stack p)) (real_relations (relations_by whole_ranges p)) x x'.
 Proof.
-  intros H. destruct (undivided_instance p H) as [I _].
-  apply along_everywhere; [now apply (stages_fit (fst (undivided_matrices p)))|]. clear.
-  unfold ranges_by, undivided_stack, functions_and_layers. cbn [fst]. generalize (between p) as s.
-  induction (hidden p) as [|l ls IH]; intros s; cbn; constructor; [|apply IH].
+  intros H C. destruct (undivided_instance p H) as [I _].
+  apply along_everywhere; [now apply (stages_fit (fst (undivided_matrices p)))|]. revert C. clear.
+  unfold relations_by, undivided_stack, functions_and_layers, chained_between. cbn [fst]. generalize (between p) as s.
+  induction (hidden p) as [|l ls IH]; intros s C; cbn in C |- *; constructor; apply andb_prop in C; [|now apply IH].
   cbn [fst snd weights real_layer]. intros y y' L L'. rewrite map_length in L, L'.
+  apply (related_in_groups _ whole_ranges _ (fst l)); try tauto. intros _.
   apply (increments_by_number _ _ _ (fun _ _ => True) (fun _ _ => True)); auto using any_numbers.
   - intros _ u u' _ _. apply slope_increment, range_holds.
   - intros _. apply kept_range_has_one.
 Qed.
+Lemma whole_entrywise a y : changes_numbers a = true -> whole a y = whole_by_number a y.
+Proof. destruct a as [| | | | | | | |[k| |]|]; try discriminate; reflexivity. Qed.
 Lemma increments_in a t p q d e : changes_numbers a = true -> Forall2 (follows d) t p -> Forall2 (follows e) t q ->
   increments_within (map real_range (slopes_known a t)) p q (whole_by_number a p) (whole_by_number a q).
 Proof.
@@ -663,35 +895,39 @@ Lemma centred_along radius d e between hs s : bounded_by radius d -> bounded_by 
   (forall k, In k hs -> length (snd k) = length (fst k)) -> forall x y,
   Forall2 (follows d) s x -> Forall2 (follows e) s y ->
   along (functions_and_layers between (map real_layer hs))
-    (real_ranges (ranges_centred radius (rounding_of radius) between hs s)) x y.
+    (real_relations (map Each (ranges_centred radius (rounding_of radius) between hs s))) x y.
 Proof.
   intros D E. revert between s. induction hs as [|k hs IH]; intros between s N L x y X Y; cbn; auto.
   set (a := hd Relu between).
   destruct (entrywise_first between N) as [A' N']. fold a in A'.
-  assert (forall z, activated a z = whole_by_number a z) as M by (intros; now apply whole_activated).
   pose proof (passed_follow radius d (fst k) (snd k) s x D (L k (or_introl eq_refl)) X) as P.
   pose proof (passed_follow radius e (fst k) (snd k) s y E (L k (or_introl eq_refl)) Y) as G.
-  split; [now apply (increments_in a _ _ _ d e)|]. apply IH; auto.
-  - intros. apply L. now right.
-  - rewrite <- M. now apply activated_known_follow.
-  - rewrite <- M. now apply activated_known_follow.
+  assert (forall z, activated a z = whole a z) as M.
+  { intros z. rewrite (whole_activated a z z); auto. destruct a as [| | | | | | | |[k'| |]|]; try discriminate;
+    exact A'. }
+  split.
+  - cbn [related real_relation]. rewrite !whole_entrywise by auto. now apply (increments_in a _ _ _ d e).
+  - apply IH; auto; [intros; apply L; now right| |]; rewrite <- M; now apply activated_known_follow.
 Qed.
 Lemma local_slope_sound ps f moves scale b u rho t factor :
   check_local_slope ps f moves scale b u rho t factor = true -> holds ps (Slope_in_box f moves scale b u).
 Proof.
-  unfold check_local_slope. intros H rest x y Ha _ X Y. do 3 both H.
+  unfold check_local_slope. intros H rest x y Ha _ X Y. do 3 both H. rename H2 into He.
+  assert (forallb chained_between (parts_of ps f) = true) as H2.
+  { rewrite forallb_forall in He |- *. intros p Hp. now apply entrywise_chained, He. }
   apply (chain_sound ps f moves scale u rho t factor undivided_matrices undivided_stack _ rest x y H H2 H1 H0
     undivided_instance undivided_value Ha).
   pose proof (moved_fits _ _ _ _ H) as W. set (p := part_at ps (moved f)) in *.
-  assert (entrywise_between p = true) as N by (destruct f; cbn in H2; now both H2).
+  assert (entrywise_between p = true) as N by (destruct f; cbn in He; now both He).
   apply (within_clamped (clamp p)) in X, Y.
   destruct (inputs_follow _ _ X) as (d & D & _ & F). destruct (inputs_follow _ _ Y) as (e & D' & _ & F').
   specialize (F O [] eq_refl). specialize (F' O [] eq_refl).
-  assert (along (fst (undivided_stack p)) (real_ranges (ranges_on_box p b)) (clamped (clamp p) x) (clamped (clamp p) y))
+  assert (along (fst (undivided_stack p)) (real_relations (map Each (ranges_on_box p b))) (clamped (clamp p) x)
+    (clamped (clamp p) y))
     as A.
   { apply (centred_along _ d e); auto. intros k K. apply (fits_layer p k W). unfold layers. apply in_or_app. now left. }
-  unfold local_ranges, p in *. destruct f as [q|phi k]; cbn [stacks_of moved along_after] in *; rewrite !plus_nil_r.
+  unfold local_relations, p in *. destruct f as [q|phi k]; cbn [stacks_of moved along_after] in *; rewrite !plus_nil_r.
   - now split.
-  - split; auto. split; auto. apply undivided_along. unfold well_formed in H. do 4 both H. cbn in H.
-    apply andb_prop in H. destruct H as [_ H]. now both H.
+  - split; auto. split; auto. unfold well_formed in H. do 4 both H. cbn in H, H2.
+    apply andb_prop in H, H2. destruct H as [_ H], H2 as [_ H2]. apply andb_prop in H, H2. now apply undivided_along.
 Qed.

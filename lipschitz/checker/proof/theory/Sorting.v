@@ -1,4 +1,5 @@
-(** Sorting is 1-Lipschitz in the Euclidean norm: a comparison with a swap is, and sorting is made of them. *)
+(** Sorting is 1-Lipschitz in the Euclidean norm and keeps sums: a comparison with a swap does, and sorting is made of
+    them. *)
 From Coq Require Import List Reals Lra Lia Psatz.
 From Swarmcert Require Import Algebra Activations Form Network.
 Import ListNotations.
@@ -100,4 +101,68 @@ Proof.
   - rewrite <- H. now apply groups_contract.
   - now apply halves_contract.
   - destruct (pairs_contract (length u) u v (le_n _) H) as [E I]. now rewrite apart_app.
+Qed.
+
+(** Group by group *)
+Lemma total_app u v : total (u ++ v) = total u + total v.
+Proof. induction u as [|a u IH]; simpl; [ring|]. rewrite IH. ring. Qed.
+Lemma total_inserted a l : total (insertedR a l) = a + total l.
+Proof.
+  revert a. induction l as [|b l IH]; intros a; simpl; auto. rewrite IH. unfold Rmin, Rmax.
+    destruct (Rle_dec a b); ring.
+Qed.
+Lemma total_ascending l : total (ascendingR l) = total l.
+Proof.
+  induction l as [|a l IH]; auto. change (ascendingR (a :: l)) with (insertedR a (ascendingR l)).
+  now rewrite total_inserted, IH.
+Qed.
+Lemma total_minus u v : length u = length v -> total (minus u v) = total u - total v.
+Proof.
+  unfold minus. revert v. induction u as [|a u IH]; intros [|b v]; simpl; try discriminate; intros; [ring|].
+  rewrite IH by lia. ring.
+Qed.
+Lemma minus_app u v w z : length u = length v -> minus (u ++ w) (v ++ z) = minus u v ++ minus w z.
+Proof. unfold minus. revert v. induction u as [|a u IH]; intros [|b v]; simpl; try discriminate; intros; auto.
+  now rewrite IH by lia. Qed.
+Lemma firstn_exactly {T} k (u v : list T) : length u = k -> firstn k (u ++ v) = u.
+Proof. intros <-. rewrite firstn_app, Nat.sub_diag, firstn_all. apply app_nil_r. Qed.
+Lemma skipn_exactly {T} k (u v : list T) : length u = k -> skipn k (u ++ v) = v.
+Proof. intros <-. now rewrite skipn_app, Nat.sub_diag, skipn_all. Qed.
+Lemma minus_split k u v : length u = length v ->
+  minus u v = minus (firstn k u) (firstn k v) ++ minus (skipn k u) (skipn k v).
+Proof.
+  intros H. rewrite <- minus_app by now apply length_firstn_same. now rewrite !firstn_skipn.
+Qed.
+Lemma length_groups n k u : length u = (n * k)%nat -> length (groupsR n k u) = (n * k)%nat.
+Proof.
+  revert u. induction n as [|n IH]; intros u; simpl; intros H; auto.
+  rewrite app_length, length_ascending, firstn_length, IH; [lia|]. rewrite skipn_length. lia.
+Qed.
+Theorem groups_keep_sums n k u v : length u = (n * k)%nat -> length v = (n * k)%nat ->
+  groups_within n k (minus u v) (minus (groupsR n k u) (groupsR n k v)).
+Proof.
+  revert u v. induction n as [|n IH]; intros u v Hu Hv; simpl in Hu, Hv.
+  - destruct u, v; try discriminate. now split.
+  - assert (length (firstn k u) = k) as Fu by (rewrite firstn_length; lia).
+    assert (length (firstn k v) = k) as Fv by (rewrite firstn_length; lia).
+    rewrite (minus_split k u v) by congruence. cbn [sorted_groups].
+    rewrite minus_app by (rewrite !length_ascending; congruence).
+    set (a := minus (firstn k u) (firstn k v)). set (b := minus (ascendingR _) (ascendingR _)).
+    assert (length a = k) as La by (unfold a; rewrite length_minus; congruence).
+    assert (length b = k) as Lb by (unfold b; rewrite length_minus; rewrite !length_ascending; congruence).
+    cbn [groups_within]. rewrite !firstn_exactly, !skipn_exactly by auto. repeat split; auto.
+    + apply ascending_contracts. congruence.
+    + unfold a, b. rewrite !total_minus by (rewrite ?length_ascending; congruence). now rewrite !total_ascending.
+    + apply IH; rewrite skipn_length; lia.
+Qed.
+Lemma groups_of_none n k : groupsR n k [] = [].
+Proof. induction n as [|n IH]; simpl; auto. now rewrite firstn_nil, skipn_nil, IH. Qed.
+Lemma sort_groups n k u : length u = (n * k)%nat -> sort_layer (Groups k) u = groupsR n k u.
+Proof.
+  unfold sort_layer. cbn [sorted_by]. intros H. assert (k = O \/ (n <= length u)%nat) as [->|L] by (destruct k; nia).
+  - rewrite Nat.mul_0_r in H. destruct u; [|discriminate]. now rewrite !groups_of_none.
+  - replace (length u) with (n + (length u - n))%nat by lia. generalize (length u - n)%nat as extra. clear L.
+    revert u H. induction n as [|n IH]; intros u H extra; simpl in *.
+    + destruct u; [|discriminate]. apply groups_of_none.
+    + rewrite IH; auto. rewrite skipn_length. lia.
 Qed.

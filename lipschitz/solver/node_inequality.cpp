@@ -1,9 +1,10 @@
-#include "lipschitz/branch/node_inequality.h"
+#include "lipschitz/solver/node_inequality.h"
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "lipschitz/solver/dense_kernels.h"
 
@@ -13,39 +14,21 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-namespace {
-
-std::vector<SlopeLayer> slope_layers(const LocalChain& chain, const std::vector<NeuronState>& states) {
-  std::vector<SlopeLayer> layers;
-  std::size_t neuron = 0;
-  for (const auto& hidden : chain.hidden) {
-    const Index rows = hidden.weights.rows();
-    layers.push_back({hidden.weights, VectorXd::Zero(rows), VectorXd::Zero(rows)});
-    for (Index i = 0; i < rows; ++i, ++neuron) {
-      layers.back().low(i) = states[neuron] == NeuronState::kOn ? 1 : 0;
-      layers.back().width(i) = states[neuron] == NeuronState::kUndecided ? 1 : 0;
-    }
-  }
-  MatrixXd& first = layers.front().weights;
-  first = MatrixXd(first(Eigen::all, chain.block));
-  for (Index k = 0; k < first.cols(); ++k) first.col(k) *= chain.weight[static_cast<std::size_t>(k)];
-  return layers;
-}
-
-}  // namespace
-
-NodeInequality::NodeInequality(const LocalChain& chain, const std::vector<NeuronState>& states,
-                               const MatrixXd& gram)
-    : NodeInequality(slope_layers(chain, states), gram) {}
-
 NodeInequality::NodeInequality(const std::vector<SlopeLayer>& layers, const MatrixXd& gram)
     : inputs_(layers.front().weights.cols()) {
-  Index neuron = 0;
-  for (const SlopeLayer& layer : layers)
-    for (const double width : layer.width) {
-      if (width > 0) undecided_.push_back(neuron);
-      ++neuron;
+  Index neuron = 0, tie = -1;
+  bool is_tied = false;
+  for (const SlopeLayer& layer : layers) {
+    is_tied = is_tied || layer.group > 1;
+    Index group = -1;
+    for (Index i = 0; i < layer.width.size(); ++i, ++neuron) {
+      if (!(layer.width(i) > 0)) continue;
+      if (i / layer.group != std::exchange(group, i / layer.group)) ++tie;
+      undecided_.push_back(neuron);
+      ties_.push_back(tie);
     }
+  }
+  if (!is_tied) ties_.clear();
   const auto free = static_cast<Index>(undecided_.size());
   const Index n = inputs_ + free;
   a_ = MatrixXd::Zero(free, n);

@@ -1,22 +1,28 @@
-/// @file LipSDP-Neuron on a box, with the decided neurons eliminated.
+/// @file LipSDP-Neuron where each neuron has a range of slopes of its own, with those that have one slope eliminated.
 #pragma once
 
 #include <Eigen/Core>
 #include <vector>
 
-#include "lipschitz/branch/conflicts.h"
-#include "lipschitz/branch/local_chain.h"
 #include "lipschitz/solver/interior_point.h"
 
 namespace swarmcert::lipschitz {
 
-/// State of a neuron over a box.
-enum class NeuronState : char { kOff, kOn, kUndecided };
+/// A pair of states that cannot occur together: s_1 y_1 > 0 and s_2 y_2 > 0 hold nowhere in the box at once, with s = 1
+/// for on and s = -1 for off, because lambda s_1 y_1 + (1 - lambda) s_2 y_2 < 0. Neurons are numbered over all outputs
+/// of hidden layers.
+struct NeuronPair {
+  Eigen::Index first = 0, second = 0;  ///< first < second
+  bool first_on = true, second_on = true;
+  double lambda = 0;
+};
 
 /// One hidden layer; the slope of neuron i lies in [low_i, low_i + width_i].
 struct SlopeLayer {
   Eigen::MatrixXd weights;
   Eigen::VectorXd low, width;
+  /// Neurons of one group, which follow one another, share a multiplier: |dz| <= |dy| holds for them together. 1: none.
+  int group = 1;
 };
 
 /// The matrix S(rho, t) over the moving inputs and a variable w = (dz - low dy) / sqrt(width) for each undecided neuron
@@ -27,13 +33,6 @@ class NodeInequality final : public RankTwoInequality {
  public:
   /// @param gram G of the function behind the hidden layers.
   NodeInequality(const std::vector<SlopeLayer>& layers, const Eigen::MatrixXd& gram);
-  /// Of ReLU: a neuron that is off has dz = 0, one that is on has dz = dy.
-  /// @param gram G of the function behind the hidden layers.
-  NodeInequality(const LocalChain& chain, const std::vector<NeuronState>& states,
-                 const Eigen::MatrixXd& gram);
-  /// Uses the Gram matrix of the chain.
-  NodeInequality(const LocalChain& chain, const std::vector<NeuronState>& states)
-      : NodeInequality(chain, states, chain.gram) {}
 
   Eigen::Index size() const override { return a_.cols(); }
   Eigen::Index inputs() const override { return inputs_; }
@@ -42,6 +41,7 @@ class NodeInequality final : public RankTwoInequality {
   Eigen::MatrixXd times_a(const Eigen::MatrixXd& x) const override;
   Eigen::MatrixXd a_transposed_times(const Eigen::MatrixXd& x) const override;
   Eigen::MatrixXd times_patterned(const Eigen::MatrixXd& x, const Eigen::MatrixXd& d) const override;
+  std::vector<Eigen::Index> ties() const override { return ties_; }
 
   /// Adds the constraint of a pair of undecided neurons: 2 u_1 u_2 = 0 with u = dz (on) or dy - dz (off). Its
   /// multiplier may have either sign.
@@ -78,6 +78,7 @@ class NodeInequality final : public RankTwoInequality {
   Eigen::MatrixXd a_;  ///< [neurons x size] rows a_i'
   std::vector<LayerBlock> blocks_;
   std::vector<Factors> pairs_;
+  std::vector<Eigen::Index> ties_;
   Eigen::MatrixXd last_gram_;  ///< Gram matrix of df in the variables
 };
 
