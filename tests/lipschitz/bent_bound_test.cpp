@@ -1,6 +1,7 @@
 /// The matrix inequality of neurons with slopes in any [a, b]: known values, proofs and refusals.
 #include "lipschitz/upper/bent_bound.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
@@ -10,6 +11,7 @@
 #include "lipschitz/checker/stages.h"
 #include "lipschitz/networks.h"
 #include "lipschitz/solver/chain_newton.h"
+#include "lipschitz/solver/node_inequality.h"
 #include "lipschitz/upper/live_chain.h"
 #include "nn/base/content_hash.h"
 #include "nn/base/json.h"
@@ -241,6 +243,25 @@ TEST(BentBound, NoneOfAMillionSlopesIsAbove) {
   }
   EXPECT_EQ(tried, 1000000);
   EXPECT_GT(closest, 0.8) << "the sampled slopes are too small for a meaningful test";
+}
+
+/// One layer: neurons that share a multiplier are not longer together than what enters them.
+TEST(NodeInequality, OfOneTiedLayerHasTheSquareOfItsNormAsOptimum) {
+  Eigen::MatrixXd w(3, 2);
+  w << 1, 2, -1, 0.5, 3, 1;
+  const double norm = w.operatorNorm();
+  SlopeLayer layer{w, Eigen::VectorXd::Constant(3, -1), Eigen::VectorXd::Constant(3, 2)};
+  layer.group = 3;
+  const NodeInequality tied({layer}, Eigen::MatrixXd::Identity(3, 3));
+  EXPECT_EQ(tied.ties(), (std::vector<Eigen::Index>{0, 0, 0}));
+  Eigen::VectorXd start = Eigen::VectorXd::Constant(4, 2);
+  start(0) = 4 * norm * norm;
+  const InteriorPointResult found = minimise(tied, start, {});
+  EXPECT_EQ(found.stop, LipSdpStop::kGapReached) << name(found.stop);
+  const Eigen::VectorXd& best = found.points.back();
+  EXPECT_NEAR(best(0), norm * norm, 1e-6 * norm * norm);
+  EXPECT_EQ(best(1), best(2));
+  EXPECT_EQ(best(2), best(3));
 }
 
 }  // namespace
