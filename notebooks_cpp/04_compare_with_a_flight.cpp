@@ -10,7 +10,7 @@
 // %%
 #include <fmt/format.h>
 
-#include "analysis/residuals/comparison.h"
+#include "analysis/residuals/failing_place.h"
 #include "notebooks_cpp/flights.h"
 #include "notebooks_cpp/notebook.h"
 
@@ -25,12 +25,14 @@ int main() {
   const residuals::Comparison comparison = residuals::compare(inputs, 0, [](int, int) {});
 
   // %%
-  const double gf = 1 / stability::kGramForce_N;
+  const residuals::ForceUnit mN = residuals::force_unit("N", inputs.models);
+  const double per_N = mN.per_newton();
   const residuals::ErrorStatistics& all = comparison.overall.statistics;
   fmt::print("records {}\n", all.samples);
-  fmt::print("RMSE (gf)  x {:.2f}  y {:.2f}  z {:.2f}\n", all.rmse.x * gf, all.rmse.y * gf, all.rmse.z * gf);
-  fmt::print("bias (gf)  x {:+.2f}  y {:+.2f}  z {:+.2f}\n", all.bias.x * gf, all.bias.y * gf,
-             all.bias.z * gf);
+  fmt::print("RMSE (mN)  x {:.2f}  y {:.2f}  z {:.2f}\n", all.rmse.x * per_N, all.rmse.y * per_N,
+             all.rmse.z * per_N);
+  fmt::print("bias (mN)  x {:+.2f}  y {:+.2f}  z {:+.2f}\n", all.bias.x * per_N, all.bias.y * per_N,
+             all.bias.z * per_N);
 
   // %% [markdown]
   // In which regions is it worst? Regions are ranges of height, speed, place of the neighbours and thrust.
@@ -38,7 +40,7 @@ int main() {
   // %%
   for (std::size_t i = 0; i < 3 && i < comparison.regions.size(); ++i) {
     fmt::print("{:4.1f} % of the squared residual: {}\n", 100 * comparison.regions[i].share,
-               comparison.regions[i].words);
+               residuals::region_words(comparison.regions[i], mN));
   }
 
   // %% [markdown]
@@ -48,9 +50,10 @@ int main() {
   std::string data;
   const residuals::TrackErrors& track = comparison.tracks.front();
   for (std::size_t i = 0; i < track.series.size(); i += 4) {
-    data += fmt::format("{:.2f} {:.2f}\n", track.series[i][0], static_cast<double>(track.series[i][3]) * gf);
+    data +=
+        fmt::format("{:.2f} {:.2f}\n", track.series[i][0], static_cast<double>(track.series[i][3]) * per_N);
   }
   notebook::plot("residual", data,
-                 "set xlabel 'time (s)'\nset ylabel 'vertical residual (gf)'\nset grid\n"
+                 "set xlabel 'time (s)'\nset ylabel 'vertical residual (mN)'\nset grid\n"
                  "plot 'residual.dat' using 1:2 with lines linecolor rgb '#0072b2' notitle\n");
 }

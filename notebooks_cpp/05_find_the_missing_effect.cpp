@@ -32,9 +32,9 @@ int main() {
   for (const identification::Missing& one : missing) {
     const identification::Finding& finding = one.finding;
     const double drop = 100 * (1 - finding.rmse_after_N / finding.rmse_before_N);
-    fmt::print("{:<12} RMSE {:.4f} -> {:.4f} N, {:.0f} % less (90 %: {:.0f} .. {:.0f})\n", one.effect,
-               finding.rmse_before_N, finding.rmse_after_N, drop, 100 * finding.drop_interval.lower,
-               100 * finding.drop_interval.upper);
+    fmt::print("{:<12} RMSE {:.1f} -> {:.1f} mN, {:.0f} % less (90 %: {:.0f} .. {:.0f})\n", one.effect,
+               1000 * finding.rmse_before_N, 1000 * finding.rmse_after_N, drop,
+               100 * finding.drop_interval.lower, 100 * finding.drop_interval.upper);
     data += fmt::format("{} {:.1f} {:.1f} {:.1f}\n", one.effect, drop, 100 * finding.drop_interval.lower,
                         100 * finding.drop_interval.upper);
   }

@@ -30,15 +30,15 @@ int main() {
   // %%
   std::string data;
   for (const stability::LadderRow& row : ladder.rows) {
-    fmt::print("{:<12} fit {:.4f}  select {:.4f}  test {:.4f} N  {}\n", row.effect, row.fit_rmse_N,
-               row.select_rmse_N, row.test_rmse_N, row.accepted ? "" : row.note);
+    fmt::print("{:<12} fit {:.1f}  select {:.1f}  test {:.1f} mN  {}\n", row.effect, 1000 * row.fit_rmse_N,
+               1000 * row.select_rmse_N, 1000 * row.test_rmse_N, row.accepted ? "" : row.note);
     data +=
-        fmt::format("\"{}\" {:.4f} {:.4f} {:.4f}\n", row.effect == "nominal" ? row.effect : "+ " + row.effect,
-                    row.fit_rmse_N, row.test_rmse_N, row.noise_floor_N);
+        fmt::format("\"{}\" {:.2f} {:.2f} {:.2f}\n", row.effect == "nominal" ? row.effect : "+ " + row.effect,
+                    1000 * row.fit_rmse_N, 1000 * row.test_rmse_N, 1000 * row.noise_floor_N);
   }
   notebook::plot("ladder", data,
                  "set style data linespoints\nset yrange [0:*]\nset grid y\nset ylabel 'RMSE of the force "
-                 "residual (N)'\n"
+                 "residual (mN)'\n"
                  "plot 'ladder.dat' using 0:2:xtic(1) linecolor rgb '#0072b2' title 'flights of the fit', "
                  "'' using 0:3 linecolor rgb '#d55e00' title 'test flights', "
                  "'' using 0:4 with lines dashtype 2 linecolor rgb '#999999' title 'noise floor'\n");

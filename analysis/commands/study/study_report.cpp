@@ -75,18 +75,6 @@ void add_answer(Report& report, const StudyResult& result, const Notes& notes,
   report.literal(result.next_command);
 }
 
-/// What the ladder added beside the effects that the diagnosis names.
-std::string added_later(const StudyResult& result) {
-  std::string names;
-  for (const Cause& cause : result.causes) {
-    bool is_named = false;
-    for (const identification::Missing& missing : result.study.diagnosis.ranking)
-      is_named = is_named || missing.effect == cause.name;
-    if (!is_named) names += (names.empty() ? "" : ", ") + cause.name;
-  }
-  return names;
-}
-
 std::string write_page(const StudyResult& result, const StudyFlights& flights, const Notes& notes,
                        const residuals::ForceUnit& unit, const files::Json& document,
                        const std::string& folder) {
@@ -107,12 +95,14 @@ std::string write_page(const StudyResult& result, const StudyFlights& flights, c
   add_before_and_after(report, study.before.all, study.after.all, study.pictures.room, unit);
   add_moments(report, study.before.all, unit);
   add_flown(report, flights.flown, study.before.all, unit);
-  report.heading("The remainder, and what to fly next");
-  const std::string later = added_later(result);
-  if (!later.empty())
-    report.paragraph("Of the search for named effects in the force, before this was added: " + later + ".");
-  add_left(report, study.diagnosis, unit);
-  add_remainder(report, study.diagnosis, 1, unit);
+  report.heading("What is left, and what to fly next");
+  if (adds_forms(result)) {
+    report.paragraph("With all that was added: " + residuals::sentence(result.left));
+    add_detectable(report, study.diagnosis);
+  } else {
+    add_left(report, study.diagnosis, unit);
+    add_remainder(report, study.diagnosis, 1, unit);
+  }
   if (result.next.empty())
     report.paragraph("Another flight would not answer any of the questions that are still open.");
   for (const std::string& flight : result.next) report.paragraph("Fly " + flight + ".");
