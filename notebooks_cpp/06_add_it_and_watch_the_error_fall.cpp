@@ -5,6 +5,26 @@
 // and to a final test that influences nothing.
 //
 //     accepted if RMSE(select) falls by at least half a percent;   reported: RMSE(test)
+//
+// As commands:
+//
+// ```console
+// $ fly='swarmcert simulate random-walk --vehicles 2 --duration 30 --gains controller/gains/crazyflie-small.toml'
+// $ for run in 1 2 3; do $fly --model stability/models/crazyflie-small-effects.toml --seed $run -o flights/$run; done
+// ...
+// $ model=stability/models/crazyflie-small.toml
+// $ swarmcert add downwash,motor_lag,drag_linear --model $model flights -o fitted.toml
+// ...
+//   + downwash        10.24        10.23      10.58          1.50
+//   + motor_lag        7.63         7.68       7.62          1.08
+//   + drag_linear      7.12         7.15       7.10          1.01
+// ...
+// $ swarmcert add undo --model fitted.toml -o before.toml
+// ...
+// Written: before.toml
+// ```
+//
+// The same from C++.
 
 // %%
 #include <fmt/format.h>
