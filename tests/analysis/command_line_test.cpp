@@ -61,6 +61,7 @@ TEST_F(CommandLine, ExplainSaysWhatEffectsFieldsAndVerdictsAre) {
   expect("explain residual", 0, {"residual (word)", "The force that the model does not explain"});
   expect("explain vibration", 0, {"vibration (word)"});
   expect("explain downwahs", 2, {"did you mean \"downwash\""});
+  expect("explain platform", 2, {"no such word", "add --list"});
 }
 
 TEST_F(CommandLine, AddListsTheEffectsAndGuessesWhatAnUnknownOneMeant) {

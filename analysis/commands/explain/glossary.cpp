@@ -51,6 +51,10 @@ constexpr Term kTerms[] = {
      "Force at one frequency above 4 Hz, as of a bent propeller or a loose part. It is named with its "
      "frequency; no "
      "effect describes it: mend the vehicle, or log faster."},
+    {"saturation",
+     "Rotors at their largest force: what is asked beyond is not given. The effect thrust_saturation "
+     "describes it, and "
+     "'swarmcert bound' says whether a loop comes to it."},
     {"witness",
      "Two inputs, or one, at which a bound is attained as far as stated: no bound can be smaller."},
     {"golden vectors",
