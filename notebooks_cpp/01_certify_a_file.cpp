@@ -19,6 +19,21 @@
 //     with torch.no_grad():
 //         x = 4 * torch.rand(1000, 6) - 2
 //         numpy.savez("samples.npz", inputs=x.numpy(), outputs=model(x).numpy())
+//
+// As commands:
+//
+// ```console
+// $ swarmcert certify nn/networks/demo/network.toml -o cert.json
+// ...
+//   set:small:small     476.6906052  sdp         2791.3694       297.08258   1.605  gf/(m, m/s)
+// ...
+// verdict: proved for phi:small, rho:small: fc1 - ReLU - fc2 - ReLU - fc3 - ReLU - fc4
+// $ swarmcert check cert.json nn/networks/demo/network.toml
+// accepted: every statement verified in exact arithmetic: 8 spectral norms, 3 upper bounds, 3 lower bounds
+// ...
+// ```
+//
+// The same from C++.
 
 // %%
 #include <fmt/format.h>

@@ -8,6 +8,27 @@
 //     sup |e|     = |h|_1 d_m                                      exact for a linear loop; h: step response of the error
 //
 // The theorem does not account for motor lag; the exact gain of the loop does.
+//
+// As commands:
+//
+// ```console
+// $ model=stability/models/crazyflie-small.toml
+// $ swarmcert bound --gains controller/gains/composite.toml --model $model --rate 0.3 --amplitude 0.1 --details
+// ...
+//   ball of the continuous loop, in the long run: 0.137868 m; of the loop that flies: 0.137868 m
+// ...
+//   z    command  continuous    0.137868  0.0995112          -          -  0.0866994  0.0867865  amplitude and rate
+// ...
+// $ swarmcert tune --gains controller/gains/crazyflie-small.toml --model $model --nodes 200
+// ...
+//   Kpos_P z                         10      18.0771     +80.8 %  1/s^2
+//   Kpos_D z                          5      4.95221      -1.0 %  1/s
+// ...
+// active constraints: noise, lag_limit, rate
+// ...
+// ```
+//
+// The same from C++.
 
 // %%
 #include <fmt/format.h>

@@ -8,6 +8,27 @@
 //     proved > limit >= attained    inconclusive: neither proved nor refuted
 //
 // Only a release that passes may fly.
+//
+// As commands:
+//
+// ```console
+// $ swarmcert certify nn/networks/demo/network.toml -o cert.json
+// ...
+// $ printf '%s\n' 'schema = "swarmcert/policy/1"' '[release]' 'network = "nn/networks/demo/network.toml"' >policy.toml
+// $ printf '%s\n' 'certificate = "cert.json"' '[certificate]' '[lipschitz]' 'max_joint_gf = 500' >>policy.toml
+// $ swarmcert gate policy.toml --bundle evidence
+// ...
+//   lipschitz    pass               476.691           <= 500             -  gf/(m, m/s)  7
+// ...
+// verdict: pass
+// ...
+// $ swarmcert verify-bundle evidence
+// ...
+// accepted: evidence
+// ...
+// ```
+//
+// The same from C++.
 
 // %%
 #include <fmt/format.h>

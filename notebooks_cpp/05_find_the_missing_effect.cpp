@@ -8,6 +8,24 @@
 //
 // An effect counts if it lowers the error of flights that are not part of the fit, is significant against the scatter between
 // blocks of 2 s, and is confirmed by instrumental variables made from the setpoints.
+//
+// As commands:
+//
+// ```console
+// $ fly='swarmcert simulate random-walk --vehicles 2 --duration 30 --gains controller/gains/crazyflie-small.toml'
+// $ for run in 1 2 3; do $fly --model stability/models/crazyflie-small-effects.toml --seed $run -o flights/$run; done
+// ...
+// $ swarmcert diagnose stability/models/crazyflie-small.toml flights
+// ...
+//   downwash        RMSE 22.62 -> 10.43 mN (53.9 %, 90 %: 46.9 .. 60.1)
+// ...
+//   motor_lag       RMSE 10.43 -> 7.677 mN (26.4 %, 90 %: 24.1 .. 28.6)
+// ...
+//   Left: 7.127 mN (noise 7.02); nothing stands out.
+// ...
+// ```
+//
+// The same from C++.
 
 // %%
 #include <fmt/format.h>
@@ -32,9 +50,9 @@ int main() {
   for (const identification::Missing& one : missing) {
     const identification::Finding& finding = one.finding;
     const double drop = 100 * (1 - finding.rmse_after_N / finding.rmse_before_N);
-    fmt::print("{:<12} RMSE {:.4f} -> {:.4f} N, {:.0f} % less (90 %: {:.0f} .. {:.0f})\n", one.effect,
-               finding.rmse_before_N, finding.rmse_after_N, drop, 100 * finding.drop_interval.lower,
-               100 * finding.drop_interval.upper);
+    fmt::print("{:<12} RMSE {:.1f} -> {:.1f} mN, {:.0f} % less (90 %: {:.0f} .. {:.0f})\n", one.effect,
+               1000 * finding.rmse_before_N, 1000 * finding.rmse_after_N, drop,
+               100 * finding.drop_interval.lower, 100 * finding.drop_interval.upper);
     data += fmt::format("{} {:.1f} {:.1f} {:.1f}\n", one.effect, drop, 100 * finding.drop_interval.lower,
                         100 * finding.drop_interval.upper);
   }

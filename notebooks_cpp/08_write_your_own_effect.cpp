@@ -7,6 +7,27 @@
 //
 // An effect returns the force per unit of each coefficient, and states where it acts. The simulator and the identification
 // use only these columns.
+//
+// As commands:
+//
+// ```console
+// $ printf '%s\n' '[[effect]]' 'name = "net"' 'parameters = { k_N_m = 1.0, edge_m = 0.02 }' >net.toml
+// $ printf '%s\n' '[effect.expression]' 'force_x_N = "-k_N_m * max(0, x - edge_m)"' 'linear = ["k_N_m"]' >>net.toml
+// $ cat stability/models/crazyflie-small.toml net.toml >truth.toml
+// $ fly='swarmcert simulate random-walk --duration 40 --gains controller/gains/crazyflie-small.toml'
+// $ for run in 1 2 3; do $fly --vehicles 1 --model truth.toml --seed $run -o flights/$run; done
+// ...
+// $ sed 's/k_N_m = 1.0/k_N_m = 0.3/' truth.toml >guess.toml
+// $ swarmcert add net --model guess.toml flights -o fitted.toml
+// ...
+//   nominal     10.74        12.44      13.01          1.78
+//   + net        8.29         8.40       8.29          1.13
+// ...
+// net k_N_m = 0.9969, 90 % 0.9655 .. 1.034
+// ...
+// ```
+//
+// The same from C++.
 
 // %%
 #include <fmt/format.h>

@@ -17,8 +17,7 @@ apt_get() {
 }
 cd "$scratch"
 apt_get update
-apt_get source --download-only gnuplot
-tar -xf gnuplot_*.orig.tar.*
+apt_get source gnuplot  # with the distribution's patches, without which it cannot be configured
 cd gnuplot-*/
 autoreconf -fi
 ./configure --without-x --without-gd --without-cairo --without-lua --without-readline --without-latex \

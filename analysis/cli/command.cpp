@@ -1,12 +1,13 @@
 #include "analysis/cli/command.h"
 
-#include <fmt/core.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <filesystem>
 
 #include "analysis/cli/command_line.h"
 #include "analysis/cli/host.h"
+#include "analysis/report/report_text.h"
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
 #include "nn/base/text.h"
@@ -124,6 +125,28 @@ files::Network load_any_net(const files::NetworkArguments& arguments) {
     throw UsageError(has_pair ? "--order: state the file: --order phi=fc1,fc2 or rho=fc1,fc2"
                               : "--order phi=... and rho=... go with --phi and --rho");
   return files::load_any_network(arguments);
+}
+
+std::vector<std::string> network_words(const files::NetworkArguments& arguments) {
+  std::vector<std::string> words;
+  const auto add = [&words](const std::string& option, const std::string& value) {
+    if (value.empty()) return;
+    if (!option.empty()) words.push_back(option);
+    words.push_back(value);
+  };
+  add("", arguments.file);
+  add("--phi", arguments.phi);
+  add("--rho", arguments.rho);
+  add("--key", arguments.key);
+  add("--activation", arguments.activation);
+  add("--order", fmt::format("{}", fmt::join(arguments.order, ",")));
+  for (const std::string& prefix : arguments.select) add("--select", prefix);
+  return words;
+}
+
+void print_next(const CommonOptions& common, std::vector<std::string> words) {
+  words.insert(words.begin(), "swarmcert");
+  if (common.prints_text()) fmt::print("Next: {}\n", shell_line(words));
 }
 
 std::vector<std::string> reading_notes(const files::Weights& weights) {

@@ -70,6 +70,12 @@ files::Network load_net(const files::NetworkArguments& arguments);
 /// The same for networks with any activation.
 files::Network load_any_net(const files::NetworkArguments& arguments);
 
+/// Returns the words of a command line that name the same network, with --key, --activation and --order.
+std::vector<std::string> network_words(const files::NetworkArguments& arguments);
+
+/// Prints the command to type next, for a shell: "Next: swarmcert WORDS"; nothing where no text is printed.
+void print_next(const CommonOptions& common, std::vector<std::string> words);
+
 /// Returns what was assumed or computed when a weight file was read, one sentence each: the reader's notes, and by how
 /// much rounding of folded weights can change slopes.
 std::vector<std::string> reading_notes(const files::Weights& weights);

@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "analysis/identification/balance/torque_balance.h"
 #include "analysis/identification/ladder_errors.h"
@@ -218,8 +219,10 @@ class Climb {
                     "no flight shows how the vehicle turns: body rates are needed, and measured rotor "
                     "speeds, or the force of each rotor at 400 Hz");
     const Turned next = turning_->with(name);
-    const bool helps = turning_->error_ratio(next) <= 1 - kLeastFall;
-    const std::string why = helps ? "" : in_words(measure(next));
+    const double ratio = turning_->error_ratio(next);
+    const bool helps = ratio <= 1 - kLeastFall;
+    const std::string why =
+        helps ? "" : too_small_fall(std::string("the ") + kRatesAhead, 1, ratio, kLeastFall);
     if (!helps && !keeps_anyway_) return refuse(name, why);
     accept(next, why);
     return true;
@@ -259,8 +262,7 @@ class Climb {
   }
 
   static std::string in_words(const LadderMeasure& measure) {
-    return fmt::format("the {} of the select flights goes from {:.5f} to {:.5f} {}", measure.quantity,
-                       measure.select[0], measure.select[1], measure.unit);
+    return too_small_fall("the " + measure.quantity, measure.select[0], measure.select[1], kLeastFall);
   }
 
   /// The best trial under another name: an effect that does not change the force residual.
@@ -367,9 +369,7 @@ class Climb {
   bool lowers_error(Trial& next, double least_fall) {
     const double before_N = best().row.select_rmse_N, after_N = next.row.select_rmse_N;
     const bool helps = after_N <= (1 - least_fall) * before_N;
-    if (!helps)
-      next.row.note =
-          fmt::format("the error of the select flights goes from {:.5f} to {:.5f} N", before_N, after_N);
+    if (!helps) next.row.note = too_small_fall("the error", before_N, after_N, least_fall);
     return helps;
   }
 
@@ -478,6 +478,12 @@ Ladder climb(residuals::Inputs inputs, const LadderOptions& options, int jobs,
   ladder.test_looks = looks_so_far(nominal) + 1;
   Climb(inputs, options, jobs, progress, ladder).run();
   return ladder;
+}
+
+std::string too_small_fall(const std::string& what, double before, double after, double least) {
+  const double fall = before > 0 ? 1 - after / before : 0;
+  return fmt::format("{} of the select flights {} by {:.2g} %, and should fall by {:.2g} %", what,
+                     fall < 0 ? "rises" : "falls", 100 * std::abs(fall), 100 * least);
 }
 
 std::string ladder_key(const stability::EffectSpec& effect, const std::string& parameter) {

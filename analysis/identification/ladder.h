@@ -44,6 +44,10 @@ struct LadderOptions {
 Ladder climb(residuals::Inputs inputs, const LadderOptions& options, int jobs,
              const residuals::Progress& progress);
 
+/// Returns why a step is refused, in no unit: "the error of the select flights falls by 0.3 %, and should fall by 1 %".
+/// @param least that a step has to lower it by, as a share
+std::string too_small_fall(const std::string& what, double before, double after, double least);
+
 /// Returns the key of `parameter` in LadderRow::values.
 std::string ladder_key(const stability::EffectSpec& effect, const std::string& parameter);
 

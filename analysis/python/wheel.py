@@ -40,9 +40,11 @@ def bundled_libraries(program):
 
 
 def add_program(source, target, library_path):
-    """Copies a program or module without debug information; it then looks for its libraries at `library_path`."""
+    """Copies a program or module, or changes it in place, without debug information; it then looks for its libraries at
+    `library_path`."""
     target.parent.mkdir(parents=True, exist_ok=True)
-    shutil.copy2(source, target)
+    if source != target:
+        shutil.copy2(source, target)
     run("strip", "--strip-unneeded", target)
     run("patchelf", "--set-rpath", library_path, target)
 

@@ -9,7 +9,7 @@
   var graphs = [], shown = null, linking = false;
   // Colours of the page by name, because dygraphs draws on a canvas, which does not resolve CSS variables.
   function page(name) { return getComputedStyle(document.documentElement).getPropertyValue(name).trim(); }
-  var AXES = ['--curve-x', '--curve-y', '--curve-z'], MODELS = ['--curve-x', '--curve-z'];
+  var CURVES = ['--curve-x', '--curve-y', '--curve-z', '--curve-w'], MODELS = ['--curve-x', '--curve-z'];
   function element(kind, name, parent) {
     var made = document.createElement(kind);
     made.className = name;
@@ -61,19 +61,20 @@
       unit: unit, labels: words, colors: MODELS, marked: words[0],
       of: models.map(function (group) { return residual(log, group); })
     }];
-    var wanted = data.group('set point');
     data.groups.forEach(function (group) {
       if (/^residual|^set point/.test(group.name)) return;
+      var wanted = data.group('set point ' + group.name);
       var panel = {title: group.name, unit: group.unit, labels: [], colors: [], of: [], dashed: []};
       group.columns.forEach(function (name, k) {
         if (!log.changes[group.at + k]) return;
         panel.labels.push(name);
-        panel.colors.push(AXES[k]);
+        panel.colors.push(CURVES[k % CURVES.length]);
+        if (k >= CURVES.length) panel.dashed.push(name);
         panel.of.push(column(log, group.at + k));
-        if (group.name !== 'position' || !wanted || !log.changes[wanted.at + k]) return;
+        if (!wanted || !log.changes[wanted.at + k]) return;
         panel.labels.push('set point ' + name);
         panel.dashed.push('set point ' + name);
-        panel.colors.push(AXES[k]);
+        panel.colors.push(CURVES[k]);
         panel.of.push(column(log, wanted.at + k));
       });
       if (panel.of.length > 0) list.push(panel);

@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <atomic>
 #include <cctype>
+#include <climits>
 #include <cmath>
 
-#include "analysis/residuals/force_unit.h"
 #include "analysis/residuals/track_part.h"
 #include "nn/base/parallel.h"
 
@@ -65,36 +65,83 @@ Trajectories trajectories(const std::vector<TrackPart>& parts, bool has_gains) {
   return all;
 }
 
-std::vector<RegionErrors> regions_of_all(const std::vector<TrackPart>& parts, const ForceUnit& unit) {
+/// Residuals of the records in one region, with and without the model's effects.
+struct Inside {
+  std::vector<Eigen::Vector3f> r, r0;
+  void add(const ResidualPoint& point) {
+    r.push_back(point.r);
+    r0.push_back(point.r0);
+  }
+};
+
+/// The widest spread of squares that has at most kMost along x and along y.
+PlaceSquares squares_of(const std::vector<TrackPart>& parts) {
+  constexpr int kMost = 6;
+  int low[2] = {INT_MAX, INT_MAX}, high[2] = {INT_MIN, INT_MIN};
+  for (const TrackPart& part : parts) {
+    for (const ResidualPoint& point : part.part.points) {
+      for (int axis = 0; axis < 2 && point.place[0] != kNoPlace; ++axis) {
+        low[axis] = std::min<int>(low[axis], point.place[axis]);
+        high[axis] = std::max<int>(high[axis], point.place[axis]);
+      }
+    }
+  }
+  PlaceSquares squares;
+  if (low[0] > high[0]) return squares;
+  squares.width_m = kPlaceStep_m;
+  while (std::max(high[0] - low[0], high[1] - low[1]) >= kMost) {
+    squares.width_m *= 2;
+    for (int* const index : {&low[0], &low[1], &high[0], &high[1]}) *index = *index >> 1;
+  }
+  for (int axis = 0; axis < 2; ++axis) {
+    squares.first[axis] = low[axis];
+    squares.count[axis] = high[axis] - low[axis] + 1;
+  }
+  return squares;
+}
+
+/// The square of a place, x fastest; -1 without a position.
+int square_of(const ResidualPoint& point, const PlaceSquares& squares) {
+  if (point.place[0] == kNoPlace) return -1;
+  const double steps = squares.width_m / kPlaceStep_m;
+  const auto along = [&](int axis) {
+    return static_cast<int>(std::floor(point.place[axis] / steps)) - squares.first[axis];
+  };
+  return along(1) * squares.count[0] + along(0);
+}
+
+std::string name_of(const PlaceSquares& squares, int square) {
+  const auto range = [&](int axis, int k) {
+    const double from = squares.width_m * (squares.first[axis] + k);
+    return fmt::format("{} {:g} .. {:g} m", "xy"[axis], from, from + squares.width_m);
+  };
+  return range(0, square % squares.count[0]) + ", " + range(1, square / squares.count[0]);
+}
+
+std::vector<RegionErrors> regions_of_all(const std::vector<TrackPart>& parts, const PlaceSquares& squares) {
   std::vector<RegionErrors> regions;
   double all_squares = 0;
   for (const TrackPart& part : parts) {
     for (const BlockSum& block : part.part.blocks) all_squares += block.squares.sum();
   }
-  for (int variable = 0; variable < kNumVariables; ++variable) {
-    const auto count = static_cast<std::size_t>(num_regions(variable));
-    std::vector<std::vector<Eigen::Vector3f>> r(count), r0(count);
+  for (int variable = 0; variable <= kPlaceVariable; ++variable) {
+    const bool is_place = variable == kPlaceVariable;
+    std::vector<Inside> inside(
+        static_cast<std::size_t>(is_place ? squares.count[0] * squares.count[1] : num_regions(variable)));
     for (const TrackPart& part : parts) {
       for (const ResidualPoint& point : part.part.points) {
-        if (point.regions[variable] < 0) continue;
-        r[static_cast<std::size_t>(point.regions[variable])].push_back(point.r);
-        r0[static_cast<std::size_t>(point.regions[variable])].push_back(point.r0);
+        const int region = is_place ? square_of(point, squares) : point.regions[variable];
+        if (region >= 0) inside[static_cast<std::size_t>(region)].add(point);
       }
     }
-    for (std::size_t k = 0; k < count; ++k) {
-      if (r[k].size() < kFewestOfRegion) continue;
-      RegionErrors region;
-      region.variable = variable;
-      region.region = static_cast<int>(k);
-      region.statistics = statistics(r[k], r0[k]);
-      const Axes& bias = region.statistics.bias;
-      region.share = region_share(r[k].size(), bias.total, all_squares);
-      region.words = fmt::format("{}: {:+.2f} {}", region_name(variable, region.region), bias.z / unit.size_N,
-                                 unit.name);
-      if (std::hypot(bias.x, bias.y) > std::abs(bias.z)) {
-        region.words +=
-            fmt::format(" up, {:.2f} {} sideways", std::hypot(bias.x, bias.y) / unit.size_N, unit.name);
-      }
+    for (std::size_t k = 0; k < inside.size(); ++k) {
+      const auto& [r, r0] = inside[k];
+      if (r.size() < kFewestOfRegion) continue;
+      const int index = static_cast<int>(k);
+      RegionErrors region = {variable, index,
+                             is_place ? name_of(squares, index) : region_name(variable, index), 0,
+                             statistics(r, r0)};
+      region.share = region_share(r.size(), region.statistics.bias.total, all_squares);
       regions.push_back(std::move(region));
     }
   }
@@ -118,12 +165,18 @@ void name_compositions(const Kinds& kinds, std::vector<TrackPart>& tracks) {
   for (std::size_t i = 0; i < tracks.size(); ++i) {
     std::vector<std::string> others;
     for (std::size_t j = 0; j < tracks.size(); ++j) {
-      if (j != i) others.push_back(word(tracks[j].errors.kind));
+      if (j != i) others.push_back(tracks[j].errors.kind);
     }
-    std::sort(others.rbegin(), others.rend());
+    std::sort(others.begin(), others.end(),
+              [&](const std::string& a, const std::string& b) { return word(a) > word(b); });
+    TrackErrors& errors = tracks[i].errors;
     std::string name;
-    for (const std::string& other : others) name += (brief || name.empty() ? "" : "+") + other;
-    tracks[i].errors.composition = (name.empty() ? "Ge" : name) + "2" + word(tracks[i].errors.kind);
+    errors.composition_words = errors.kind + (others.empty() ? " alone" : " with ");
+    for (const std::string& other : others) {
+      errors.composition_words += (name.empty() ? "" : " and ") + other;
+      name += (brief || name.empty() ? "" : "+") + word(other);
+    }
+    errors.composition = (name.empty() ? "Ge" : name) + "2" + word(errors.kind);
   }
 }
 
@@ -213,6 +266,7 @@ Comparison compare(const Inputs& inputs, int jobs, const Progress& progress, con
     vehicles[part.errors.vehicle].push_back(&part.part);
     kinds[part.errors.kind].push_back(&part.part);
     compositions[part.errors.composition].push_back(&part.part);
+    result.composition_words[part.errors.composition] = part.errors.composition_words;
     result.moments.insert(result.moments.end(), part.moments.begin(), part.moments.end());
   }
   result.overall = errors_of(all);
@@ -220,7 +274,8 @@ Comparison compare(const Inputs& inputs, int jobs, const Progress& progress, con
   for (const auto& [name, members] : vehicles) result.vehicles[name] = errors_of(members);
   for (const auto& [name, members] : kinds) result.kinds[name] = errors_of(members);
   for (const auto& [name, members] : compositions) result.compositions[name] = errors_of(members);
-  result.regions = regions_of_all(parts, force_unit(inputs));
+  result.squares = squares_of(parts);
+  result.regions = regions_of_all(parts, result.squares);
   sort_and_shorten(result.moments);
   std::vector<Eigen::Vector4d> bias;
   std::vector<ErrorWindow> windows;

@@ -37,6 +37,7 @@ struct Moment {
 /// Errors of one vehicle in one flight.
 struct TrackErrors : TrackHead {
   std::string composition;                                               ///< see Comparison::compositions
+  std::string composition_words;                                         ///< "small with large and small"
   std::array<std::size_t, static_cast<std::size_t>(Cut::kCount)> cut{};  ///< number of records per cut
   double used_s = 0;                  ///< sum of the steps between consecutive used records
   std::vector<std::string> findings;  ///< what was wrong with the log
@@ -49,9 +50,16 @@ struct TrackErrors : TrackHead {
 
 struct RegionErrors {
   int variable = 0, region = 0;
-  std::string words;  ///< "height below 0.08 m: +3.5 gf"
-  double share = 0;   ///< fraction of the total squared residual explained by this region's bias
+  std::string name;  ///< region_name(), or that of one of PlaceSquares
+  double share = 0;  ///< fraction of the total squared residual explained by this region's bias
   ErrorStatistics statistics;
+};
+
+/// The squares, a power of two of metres wide, by which places over the ground are told apart: few along x and along y.
+struct PlaceSquares {
+  double width_m = 0;
+  int first[2] = {0, 0},
+      count[2] = {0, 0};  ///< along x and y; the first begins at first * width_m; none: no position
 };
 
 /// Vertical residual as a function of the relative position of the neighbour that is laterally closest among those
@@ -92,8 +100,10 @@ struct Comparison {
   /// Errors by the kinds of the neighbours and of the vehicle, written as initials: "SL2S"; "Ge2S" flies alone over the
   /// ground. If two kinds share an initial, kinds are written out: "small+slow2small".
   std::map<std::string, GroupErrors> compositions;
-  std::vector<RegionErrors> regions;  ///< worst first
-  std::vector<Moment> moments;        ///< worst first
+  std::map<std::string, std::string> composition_words;  ///< by the same names: "small alone"
+  std::vector<RegionErrors> regions;  ///< worst first; those of kPlaceVariable are `squares`, x fastest
+  PlaceSquares squares;
+  std::vector<Moment> moments;  ///< worst first
   LearningError learning_error;
   Trajectories trajectories;
   NeighbourMap neighbours;

@@ -40,12 +40,16 @@ void describe(files::Record& record, const FailingPlace& place) {
   record.field("words", place.words, "The same in one line.");
 }
 
+std::string region_words(const RegionErrors& region, const ForceUnit& unit) {
+  return region.name + ": " + direction_words(region.statistics, unit);
+}
+
 int failing_axis(const ErrorStatistics& s) {
   return s.rmse.z >= s.rmse.x && s.rmse.z >= s.rmse.y ? 2 : s.rmse.y >= s.rmse.x ? 1 : 0;
 }
 
 FailingPlace failing_place(const Comparison& comparison, const ForceUnit& unit) {
-  constexpr double kNoise = 1.5, kMostIsMean = 0.5, kLeastOfRegion = 0.1;
+  constexpr double kNoise = 1.5, kSlow = 3, kMostIsMean = 0.5, kLeastOfRegion = 0.1;
   const ErrorStatistics& s = comparison.overall.statistics;
   const double square = squared(s.rmse.total), noise = comparison.overall.noise_floor_N.squaredNorm();
   FailingPlace place;
@@ -53,9 +57,10 @@ FailingPlace failing_place(const Comparison& comparison, const ForceUnit& unit) 
     place.words = "no record is judged";
     return place;
   }
-  if (!(square > 0) || (noise > 0 && square <= kNoise * noise)) {
+  const bool is_slow = (comparison.overall.low_band_to_floor.array() > kSlow).any();
+  if (!(square > 0) || (noise > 0 && square <= kNoise * noise && !is_slow)) {
     place.words =
-        fmt::format("nowhere above the noise ({:.3g} {})", std::sqrt(noise) * unit.per_newton(), unit.name);
+        fmt::format("nowhere above the noise, {:.3g} {}", std::sqrt(noise) * unit.per_newton(), unit.name);
     return place;
   }
   const double above = square - (std::isfinite(noise) ? noise : 0);
@@ -70,15 +75,19 @@ FailingPlace failing_place(const Comparison& comparison, const ForceUnit& unit) 
     return static_cast<double>(r.statistics.samples) / static_cast<double>(s.samples) *
            (mean_of(r.statistics) - mean_of(s)).squaredNorm() / square;
   };
-  const auto worst = std::max_element(
-      comparison.regions.begin(), comparison.regions.end(),
-      [&](const RegionErrors& a, const RegionErrors& b) { return share_of(a) < share_of(b); });
+  const auto rank_of = [&](const RegionErrors& r) {
+    const double share = share_of(r);
+    return std::make_pair(share >= kLeastOfRegion && !is_reaction(r.variable), share);
+  };
+  const auto worst =
+      std::max_element(comparison.regions.begin(), comparison.regions.end(),
+                       [&](const RegionErrors& a, const RegionErrors& b) { return rank_of(a) < rank_of(b); });
   if (worst != comparison.regions.end() && share_of(*worst) >= kLeastOfRegion) {
     place.where = Where::kRegion;
+    place.variable = worst->variable;
     place.share = share_of(*worst);
     place.words =
-        fmt::format("at {}: {}, {:.0f} % of the mean square", region_name(worst->variable, worst->region),
-                    direction_words(worst->statistics, unit), 100 * place.share);
+        fmt::format("at {}, {:.0f} % of the mean square", region_words(*worst, unit), 100 * place.share);
     return place;
   }
   place.where = Where::kScattered;
@@ -87,5 +96,7 @@ FailingPlace failing_place(const Comparison& comparison, const ForceUnit& unit) 
                             100 * place.share);
   return place;
 }
+
+std::string sentence(const FailingPlace& place) { return "It fails " + place.words + "."; }
 
 }  // namespace swarmcert::residuals

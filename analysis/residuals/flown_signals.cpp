@@ -11,7 +11,7 @@ namespace swarmcert::residuals {
 namespace {
 
 constexpr std::size_t kMostLogs = 24;
-constexpr std::size_t kMostRows = 30000;  // of all logs: about 2 MB
+constexpr std::size_t kMostRows = 24000;  // of all logs: about 2 MB
 constexpr double kAroundMoment_s = 2;
 constexpr float kNoValue = std::numeric_limits<float>::quiet_NaN();
 
@@ -20,12 +20,14 @@ enum FlownColumn : std::size_t {
   kFlownPosition = 1,
   kFlownSetPoint = 4,
   kFlownVelocity = 7,
-  kFlownAttitude = 10,
-  kFlownRates = 13,
-  kFlownThrust = 16,
-  kFlownBattery = 17,
-  kFlownResidual = 18,
-  kFlownResidualFitted = 21
+  kFlownVelocitySetPoint = 10,
+  kFlownAttitude = 13,
+  kFlownRates = 16,
+  kFlownThrust = 19,
+  kFlownMotors = 20,
+  kFlownBattery = kFlownMotors + kMostMotors,
+  kFlownResidual = kFlownBattery + 1,
+  kFlownResidualFitted = kFlownResidual + 3
 };
 
 /// Returns indices of flights without repetition: those with the worst moments first, as many as fit.
@@ -52,6 +54,16 @@ void set_vector(const Eigen::Vector3d& values, std::size_t first, FlownRow& row)
     row[first + axis] = static_cast<float>(values[static_cast<Eigen::Index>(axis)]);
 }
 
+/// The normalised commands, or the duties of the Crazyflie.
+void set_motors(const Track& track, std::size_t i, FlownRow& row) {
+  float* const motors = &row[kFlownMotors];
+  if (track.motor_commands > 0)
+    std::copy_n(track.motor_command[i].begin(), track.motor_commands, motors);
+  else if (track.thrust_source == logs::ThrustSource::kDuty)
+    std::transform(track.duty[i].begin(), track.duty[i].end(), motors,
+                   [](double duty) { return static_cast<float>(duty); });
+}
+
 Eigen::Vector3d degrees_of(const Eigen::Matrix3d& R) {
   return 180 / kPi *
          Eigen::Vector3d(std::atan2(R(2, 1), R(2, 2)), -std::asin(std::clamp(R(2, 0), -1.0, 1.0)),
@@ -64,11 +76,15 @@ FlownRow row_of(const Track& track, std::size_t i, bool has_force) {
   row.fill(kNoValue);
   row[0] = static_cast<float>(now.time_s);
   if (track.has_height) set_vector(now.p_W_m, kFlownPosition, row);
-  if (track.targets.size() == track.instants.size()) set_vector(track.targets[i].p_W_m, kFlownSetPoint, row);
+  if (track.targets.size() == track.instants.size()) {
+    set_vector(track.targets[i].p_W_m, kFlownSetPoint, row);
+    set_vector(track.targets[i].v_W_m_s, kFlownVelocitySetPoint, row);
+  }
   set_vector(now.v_W_m_s, kFlownVelocity, row);
   set_vector(degrees_of(now.R_WB), kFlownAttitude, row);
   if (track.has_rates) set_vector(now.omega_B_rad_s, kFlownRates, row);
   if (has_force) row[kFlownThrust] = static_cast<float>(now.thrust_N);
+  set_motors(track, i, row);
   row[kFlownBattery] = static_cast<float>(now.battery_V);
   return row;
 }
@@ -142,10 +158,16 @@ std::vector<FlownRow> thinned(const std::vector<FlownRow>& rows, std::size_t mos
 
 const std::vector<FlownGroup>& flown_groups() {
   static const std::vector<FlownGroup> groups = {
-      {"position", "m", {"x", "y", "z"}},      {"set point", "m", {"x", "y", "z"}},
-      {"velocity", "m/s", {"x", "y", "z"}},    {"attitude", "degrees", {"roll", "pitch", "heading"}},
-      {"body rate", "rad/s", {"x", "y", "z"}}, {"thrust", "N", {"thrust"}},
-      {"battery", "V", {"battery"}},           {"residual", "N", {"x", "y", "z"}},
+      {"position", "m", {"x", "y", "z"}},
+      {"set point position", "m", {"x", "y", "z"}},
+      {"velocity", "m/s", {"x", "y", "z"}},
+      {"set point velocity", "m/s", {"x", "y", "z"}},
+      {"attitude", "degrees", {"roll", "pitch", "heading"}},
+      {"body rate", "rad/s", {"x", "y", "z"}},
+      {"thrust", "N", {"thrust"}},
+      {"motor command", "0 .. 1", {"1", "2", "3", "4", "5", "6", "7", "8"}},
+      {"battery", "V", {"battery"}},
+      {"residual", "N", {"x", "y", "z"}},
       {"residual after", "N", {"x", "y", "z"}}};
   return groups;
 }

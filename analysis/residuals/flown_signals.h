@@ -20,9 +20,9 @@ struct FlownGroup {
 /// Returns the groups in the order of their columns, which follow the time.
 const std::vector<FlownGroup>& flown_groups();
 
-/// Time in the flight, s; position, set point, velocity in W; roll, pitch and heading; body rates; thrust; battery;
-/// residual in W; residual with the fitted models in W.
-inline constexpr std::size_t kFlownColumns = 24;
+/// Time in the flight, s; position, its set point, velocity, its set point in W; roll, pitch and heading; body rates;
+/// thrust; command of each motor; battery; residual in W; residual with the fitted models in W.
+inline constexpr std::size_t kMostMotors = 8, kFlownColumns = 27 + kMostMotors;
 using FlownRow = std::array<float, kFlownColumns>;
 
 struct FlownVehicle {

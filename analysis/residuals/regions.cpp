@@ -20,7 +20,7 @@ struct Variable {
 const std::vector<double> kLateral_m = {0, 0.05, 0.1, 0.2, 0.4};
 const std::vector<double> kVertical_m = {0.05, 0.2, 0.3, 0.4, 0.6, 1.0};
 
-enum Index { kHeight, kSpeed, kThrust, kBattery, kTime, kTilt, kBelow, kAbove };
+enum Index { kHeight, kSpeed, kThrust, kBattery, kTime, kTilt, kClimb, kBelow, kAbove };
 
 const std::vector<Variable>& variables() {
   static const std::vector<Variable> all = {
@@ -30,6 +30,7 @@ const std::vector<Variable>& variables() {
       {"battery", "V", {2.6, 3.0, 3.2, 3.4, 3.6, 3.8, 4.0, 5}},
       {"time", "s", {0, 5, 10, 20, 40, 80, 160, 1e6}},
       {"tilt", "degrees", {0, 2, 5, 10, 20, 90}},
+      {"vertical velocity", "m/s", {-100, -1.5, -0.8, -0.4, -0.2, 0, 0.2, 0.4, 0.8, 1.5, 100}},
       {"below a vehicle", "m", {}},
       {"above a vehicle", "m", {}},
   };
@@ -59,7 +60,9 @@ std::int16_t neighbour_region(const stability::Instant& now, double sign) {
 
 }  // namespace
 
-const char* variable_name(int variable) { return variables()[static_cast<std::size_t>(variable)].name; }
+const char* variable_name(int variable) {
+  return variable == kPlaceVariable ? "place" : variables()[static_cast<std::size_t>(variable)].name;
+}
 
 void regions_of(const stability::Instant& now, double time_in_log_s, RegionIndices indices) {
   constexpr double kDegree = 180 / kPi;
@@ -70,9 +73,12 @@ void regions_of(const stability::Instant& now, double time_in_log_s, RegionIndic
   indices[kBattery] = find(v[kBattery].edges, now.battery_V);
   indices[kTime] = find(v[kTime].edges, time_in_log_s);
   indices[kTilt] = find(v[kTilt].edges, kDegree * std::acos(std::clamp(now.R_WB(2, 2), -1.0, 1.0)));
+  indices[kClimb] = find(v[kClimb].edges, now.v_W_m_s.z());
   indices[kBelow] = neighbour_region(now, 1);
   indices[kAbove] = neighbour_region(now, -1);
 }
+
+bool is_reaction(int variable) { return variable == kThrust || variable == kTilt; }
 
 int num_regions(int variable) {
   if (variable >= kBelow) return static_cast<int>((kLateral_m.size() - 1) * (kVertical_m.size() - 1));
@@ -103,7 +109,8 @@ double region_middle(int variable, int region) {
     return (kLateral_m[column] + kLateral_m[column + 1]) / 2;
   }
   const auto& edges = variables()[static_cast<std::size_t>(variable)].edges;
-  return k + 2 == edges.size() ? edges[k] : (edges[k] + edges[k + 1]) / 2;
+  if (k + 2 == edges.size()) return edges[k];
+  return k == 0 && edges[0] < 0 ? edges[1] : (edges[k] + edges[k + 1]) / 2;
 }
 
 }  // namespace swarmcert::residuals

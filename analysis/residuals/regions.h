@@ -9,9 +9,14 @@
 
 namespace swarmcert::residuals {
 
-inline constexpr int kNumVariables = 8;
-/// Returns the name of a variable whose ranges define regions: "height", "speed", ...
+inline constexpr int kNumVariables = 9;
+/// The place over the ground, whose regions depend on where the flights were: PlaceSquares.
+inline constexpr int kPlaceVariable = kNumVariables;
+/// Returns the name of a variable whose ranges define regions: "height", "speed", ..., "place".
 const char* variable_name(int variable);
+
+/// Whether the controller sets the variable: thrust and tilt vary with whatever disturbs the vehicle.
+bool is_reaction(int variable);
 
 /// The region of a record for each variable; -1 if it is in none.
 using RegionIndices = std::int16_t[kNumVariables];

@@ -93,7 +93,11 @@ void add_records(const Track& track, const std::vector<Eigen::Vector3d>& r,
     if (i > 0 && track.cut[i - 1] == Cut::kNone && track.restarts[i] == 0)
       errors.used_s += now.time_s - track.instants[i - 1].time_s;
     if (track.judged.isZero()) continue;
-    ResidualPoint point{r[i].cast<float>(), r0[i].cast<float>(), {}};
+    ResidualPoint point{r[i].cast<float>(), r0[i].cast<float>(), {}, {kNoPlace, kNoPlace}};
+    constexpr double kFarthest = std::numeric_limits<std::int16_t>::max();
+    for (int axis = 0; axis < 2 && track.has_height; ++axis)
+      point.place[axis] = static_cast<std::int16_t>(
+          std::clamp(std::floor(now.p_W_m[axis] / kPlaceStep_m), -kFarthest, kFarthest));
     regions_of(now, now.time_s - track.instants.front().time_s, point.regions);
     part.points.push_back(point);
     if (now.time_s >= block_end_s) {

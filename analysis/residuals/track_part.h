@@ -1,6 +1,8 @@
 /// @file The contribution of one track to a comparison; groups of tracks are sums of these.
 #pragma once
 
+#include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "analysis/residuals/comparison.h"
@@ -11,7 +13,10 @@ namespace swarmcert::residuals {
 struct ResidualPoint {
   Eigen::Vector3f r, r0;
   RegionIndices regions;
+  std::int16_t place[2];  ///< x and y in kPlaceStep_m, rounded down; kNoPlace if the log has no position
 };
+inline constexpr double kPlaceStep_m = 0.0625;
+inline constexpr std::int16_t kNoPlace = std::numeric_limits<std::int16_t>::min();
 
 /// Sums that are accumulated over groups of tracks.
 struct Part {

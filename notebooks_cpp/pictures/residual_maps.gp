@@ -17,7 +17,7 @@ set ylabel 'height of the neighbour above [m]'
 set title 'before: the nominal model'
 plot 'before/neighbours.dat' using 1:2:3 with image notitle
 set colorbox
-set cblabel 'mean vertical residual [gf]'
+set cblabel 'mean vertical residual [mN]'
 set lmargin at screen 0.50
 set rmargin at screen 0.86
 unset ylabel

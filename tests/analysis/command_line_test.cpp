@@ -58,7 +58,10 @@ TEST_F(CommandLine, ExplainSaysWhatEffectsFieldsAndVerdictsAre) {
   expect("explain wind", 0, {"constant_force (effect)"});
   expect("explain may_stay", 0, {"may_stay (field)", "spacing: shape.may_stay"});
   expect("explain refuted", 0, {"iss-check: verdict"});
+  expect("explain residual", 0, {"residual (word)", "The force that the model does not explain"});
+  expect("explain vibration", 0, {"vibration (word)"});
   expect("explain downwahs", 2, {"did you mean \"downwash\""});
+  expect("explain platform", 2, {"no such word", "add --list"});
 }
 
 TEST_F(CommandLine, AddListsTheEffectsAndGuessesWhatAnUnknownOneMeant) {

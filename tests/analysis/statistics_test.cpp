@@ -132,7 +132,8 @@ Comparison with_force(const Eigen::Vector3f& force_N, std::size_t in_region) {
   Comparison comparison;
   comparison.overall.statistics = statistics(all, all);
   comparison.overall.noise_floor_N = Eigen::Vector3d::Ones();
-  comparison.regions = {{0, 0, "", 0, statistics(first, first)}, {0, 1, "", 0, statistics(rest, rest)}};
+  comparison.regions = {{0, 0, region_name(0, 0), 0, statistics(first, first)},
+                        {0, 1, region_name(0, 1), 0, statistics(rest, rest)}};
   return comparison;
 }
 
@@ -149,6 +150,22 @@ TEST(FailingPlace, IsNowhereForNoiseEverywhereForAConstantForceAndTheRegionOfALo
   EXPECT_NE(region.words.find(region_name(0, 0)), std::string::npos) << region.words;
   // The mean of all is 2.5 N, of the region 10 N: 0.25 * 7.5^2 of 28 N^2.
   EXPECT_NEAR(region.share, 0.25 * 7.5 * 7.5 / 28, 0.03);
+}
+
+TEST(FailingPlace, IsNotTheThrustWithWhichTheControllerAnswersIfAnotherRegimeHoldsATenth) {
+  constexpr int kThrust = 2;
+  ASSERT_TRUE(is_reaction(kThrust));
+  Comparison comparison = with_force({0, 0, 10}, 250);
+  RegionErrors answer = comparison.regions[0];
+  answer.variable = kThrust;
+  answer.name = region_name(kThrust, 0);
+  answer.statistics.bias.z += 5;
+  comparison.regions.push_back(answer);
+  EXPECT_EQ(failing_place(comparison, {}).variable, 0);
+  comparison.regions.erase(comparison.regions.begin());
+  comparison.regions[0].statistics.bias = comparison.overall.statistics.bias;
+  EXPECT_EQ(failing_place(comparison, {}).variable, kThrust)
+      << "where nothing else fails, the thrust is the cause";
 }
 
 TEST(FailingPlace, OfNoRecordIsNoPlaceWithoutNoise) {

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "analysis/commands/add/add_output.h"
 #include "analysis/residuals/flown_signals.h"
 #include "analysis/run.h"
 #include "data.h"
@@ -123,8 +124,24 @@ TEST_F(Study, EndsWithCausesTheirSizeAndACommandThatRuns) {
   EXPECT_NEAR(rmse_N, json["after"]["test"]["rmse"]["total"].get<double>(), 1e-6);
   const std::string next = json["next_command"];
   EXPECT_NE(outcome.output.find("Next: " + next), std::string::npos) << outcome.output;
+  EXPECT_NE(outcome.output.find("rotors that follow their commands with a lag of"), std::string::npos)
+      << outcome.output;
+  EXPECT_EQ(outcome.output.find("fly to see"), std::string::npos)
+      << "nothing is left to explain" << outcome.output;
   const Outcome ran = run_shell(next, folder_.path());
   EXPECT_EQ(ran.exit_code, 0) << next << "\n" << ran.output;
+}
+
+TEST_F(Study, SaysWhereAnUpdraftIsInWordsAndOnAMap) {
+  const std::string truth = truth_with(
+      "name = \"wind_field\"\nparameters = { thermal_N = 0.06, x_m = -0.1, y_m = 0.08, radius_m = 0.06 }\n");
+  for (int run = 1; run <= 3; ++run) fly(truth, 1, 30, run, run);
+  const Outcome outcome = study("flights -o out -q");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_EQ(result("out")["fails"]["where"], "region");
+  for (const char* const words : {"It fails at x ", "mN towards +z", "Mean residual along z [mN]",
+                                  "y [m] \\ x", "wind_field: an updraft of ", "nothing else stands out"})
+    EXPECT_NE(outcome.output.find(words), std::string::npos) << words << "\n" << outcome.output;
 }
 
 TEST_F(Study, GoesOnWithAFormulaWhereNoNamedEffectExplainsTheForce) {
@@ -240,9 +257,44 @@ TEST_F(Study, EveryPageShowsForcesInTheOneUnitThatIsAsked) {
     const Outcome outcome = run_shell(
         "swarmcert " + page.command + " -q --force --report page --unit " + page.option, folder_.path());
     EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+    const std::string asked = page.shown.substr(1, page.shown.size() - 2);
+    EXPECT_NE(outcome.output.find(asked), std::string::npos) << page.command << "\n" << outcome.output;
+    for (const std::string unit : {"mN", "gf", "N", "m/s^2"})
+      EXPECT_TRUE(unit == asked || (outcome.output.find(" " + unit + " ") == std::string::npos &&
+                                    outcome.output.find("[" + unit) == std::string::npos))
+          << page.command << " also speaks of " << unit << "\n"
+          << outcome.output;
     const std::string text = read_text(folder_ / "page/report.html");
     for (const char* const unit : {"[mN]", "[gf]", "[N]", "[m/s^2]"})
       EXPECT_EQ(text.find(unit) != std::string::npos, unit == page.shown) << page.command << " and " << unit;
+  }
+}
+
+TEST(LadderTable, HasADashWhereNothingIsHeldOut) {
+  stability::LadderRow row;
+  row.effect = "nominal";
+  row.fit_rmse_N = row.select_rmse_N = 0.0123;
+  const analysis::Table table = analysis::ladder_table({row}, {"mN", 1e-3});
+  EXPECT_EQ(table.header[1], "fit [mN]");
+  EXPECT_EQ(table.rows[0], (std::vector<std::string>{"nominal", "12.30", "12.30", "-", "-"}));
+}
+
+TEST_F(Study, EveryCommandOfAWalkEndsWithTheNextOne) {
+  fly(1);
+  const std::string net = source_path("nn/networks/demo/network.toml"),
+                    model = source_path("stability/models/crazyflie-small.toml"),
+                    gains = source_path("controller/gains/crazyflie-small.toml");
+  for (const std::string& words :
+       {"simulate hover --model " + model + " --gains " + gains + " --duration 2 -o hover",
+        std::string("inspect flights/1/cf1_00"), std::string("model draft flights -o model.toml"),
+        "compare " + model + " flights", "diagnose " + model + " flights",
+        "add drag_linear --model " + model + " flights -o fitted.toml",
+        "bound --gains " + gains + " --model " + model,
+        "certify " + net + " --method product --nodes 1 -o cert.json", "check cert.json " + net,
+        "export " + net + " --certificate cert.json -o firmware", "match " + net + " firmware"}) {
+    const Outcome outcome = run_shell("swarmcert " + words + " -q", folder_.path());
+    EXPECT_NE(outcome.output.find("Next: swarmcert "), std::string::npos) << words << "\n"
+                                                                            << outcome.output;
   }
 }
 
@@ -255,6 +307,9 @@ TEST_F(Study, APageHoldsNoSignalsOfTheLogsIfItIsToldSo) {
   const std::string with = read_text(folder_ / "with/report.html"),
                     without = read_text(folder_ / "without/report.html");
   EXPECT_NE(with.find("id=\"flown-data\""), std::string::npos);
+  for (const char* const signal :
+       {"\"set point velocity\"", "\"motor command\"", "\"battery\"", "\"attitude\""})
+    EXPECT_NE(with.find(signal), std::string::npos) << signal;
   EXPECT_EQ(without.find("id=\"flown-data\""), std::string::npos);
   EXPECT_NE(without.find("This page holds no signals of the logs."), std::string::npos);
   EXPECT_LT(without.size(), with.size() / 2);
@@ -276,7 +331,7 @@ TEST_F(Study, ThinnedSignalsKeepTheirExtremesAndAllThatIsAroundAWorstMoment) {
   const residuals::FlownVehicle& vehicle = flights[0].vehicles[0];
   EXPECT_EQ(vehicle.records, track.instants.size());
   EXPECT_LT(vehicle.rows.size(), vehicle.records * 9 / 10);
-  constexpr std::size_t kThrust = 16;
+  constexpr std::size_t kThrust = 19;
   float least = INFINITY, most = -INFINITY;
   std::size_t around = 0, all_around = 0;
   for (const residuals::FlownRow& row : vehicle.rows) {

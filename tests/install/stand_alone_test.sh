@@ -35,12 +35,15 @@ has_plots "$work/report"
 "$scratch/venv/bin/python" -c 'import swarmcert; print("module", swarmcert.__version__)'
 
 root=$scratch/root
+in_root() {  # with /proc, mounted for this command only
+  unshare --mount sh -c 'root=$1 && shift && mount -t proc proc "$root/proc" && exec chroot "$root" "$@"' - "$root" "$@"
+}
 debootstrap --variant=minbase "$(. /etc/os-release && echo "$VERSION_CODENAME")" "$root" >"$scratch/debootstrap.log"
 cp "$scratch"/packages/swarmcert_*.deb "$root/tmp/"
 chroot "$root" sh -c 'apt-get update -q && apt-get install -q -y /tmp/swarmcert_*.deb' >"$scratch/apt.log"
 share=/usr/share/swarmcert work=/tmp/deb
 start=$(date +%s)
-page chroot "$root" swarmcert
+page in_root swarmcert
 echo "deb: from a log to a page in $(($(date +%s) - start)) s"
 has_plots "$root$work/report"  # gnuplot-nox is recommended by the package
 rm -rf "$scratch"

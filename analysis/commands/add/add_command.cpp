@@ -111,13 +111,13 @@ int undo(const AddOptions& options, const CommonOptions& common) {
   const stability::Model model = identification::undone(stability::read_model(path));
   files::write_file(options.output, stability::to_toml(model, heading_of(model)), common.force);
   const LadderOfModel kept = {model.path, model.ladder, model.effects};
+  const residuals::ForceUnit unit = residuals::force_unit(options.flights.unit, {model});
   const files::Node result = result_of("add", {path}, std::nullopt, AddResult{kept, {}, {}});
   write_result(common, result);
   if (common.prints_text()) {
-    print_ladder(model.ladder);
-    fmt::print("Written: {}\n", options.output);
+    fmt::print("{}Written: {}\n", to_text(ladder_table(model.ladder, unit)), options.output);
   }
-  report_ladders(options, common, result, {kept}, residuals::chosen_force_unit(options.flights.unit, model));
+  report_ladders(options, common, result, {kept}, unit);
   return kDone;
 }
 
@@ -128,11 +128,11 @@ int show(const AddOptions& options, const CommonOptions& common) {
   for (const std::string& path : options.flights.models) {
     const stability::Model model = stability::read_model(path);
     // One page uses one unit, that of the first model.
-    if (ladders.empty()) unit = residuals::chosen_force_unit(options.flights.unit, model);
+    if (ladders.empty()) unit = residuals::force_unit(options.flights.unit, {model});
     ladders.push_back({path, model.ladder, model.effects});
     if (!common.prints_text()) continue;
     fmt::print("{}{}\n", path, model.ladder.empty() ? ": no ladder" : "");
-    if (!model.ladder.empty()) print_ladder(model.ladder);
+    if (!model.ladder.empty()) fmt::print("{}", to_text(ladder_table(model.ladder, unit)));
   }
   const files::Node result =
       result_of("add", options.flights.models, std::nullopt, AddResult{{}, {}, ladders});
@@ -148,6 +148,7 @@ int climb(const AddOptions& options, const CommonOptions& common) {
   refuse_missing_folder(options.output);
   if (options.flights.models.size() != 1) throw UsageError("add takes one --model");
   residuals::Inputs inputs = read_flights(options.flights, false, false, true);
+  const residuals::ForceUnit unit = unit_of(options.flights, inputs);
   const std::vector<identification::Mislabelled> labels =
       identification::find_and_correct_labels(inputs, common.jobs);
   const std::vector<identification::ClockOffset> clocks =
@@ -186,13 +187,14 @@ int climb(const AddOptions& options, const CommonOptions& common) {
     return kInconclusive;
   }
   if (common.prints_text()) {
-    print_ladder(ladder);
+    print_ladder(ladder, unit);
     if (ladder.any_accepted)
       fmt::print("Written: {}\nNext: {}\n", options.output,
                  next_command("compare", {options.output}, options.flights, inputs, {"--horizon", "0.5"}));
     else
-      fmt::print("No effect helped: {} is not written. --keep-anyway writes it nevertheless.\n",
-                 options.output);
+      fmt::print("No effect helped: {} is not written. --keep-anyway writes it nevertheless.\nNext: {}\n",
+                 options.output,
+                 next_command("diagnose", options.flights.models, options.flights, inputs, {"--next"}));
   }
   std::vector<LadderOfModel> ladders;
   if (!ladder.earlier.empty())
@@ -201,8 +203,7 @@ int climb(const AddOptions& options, const CommonOptions& common) {
   std::optional<BeforeAfter> change;
   if (ladder.any_accepted && !options.report.empty())
     change = before_and_after(inputs, ladder, !options.flights.no_embed, common.jobs);
-  report_ladders(options, common, result, ladders, page_unit(options.flights, inputs),
-                 change ? &*change : nullptr);
+  report_ladders(options, common, result, ladders, unit, change ? &*change : nullptr);
   return kDone;
 }
 

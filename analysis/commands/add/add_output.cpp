@@ -2,6 +2,9 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "analysis/commands/shared/clock_output.h"
 #include "analysis/commands/shared/effect_output.h"
 #include "analysis/commands/shared/label_output.h"
@@ -21,6 +24,25 @@ std::vector<std::string> names_of(const std::vector<std::string>& flights, const
 
 std::optional<double> if_known(bool is_known, double value) {
   return is_known ? std::optional(value) : std::nullopt;
+}
+
+/// Number of decimals with which the largest error has four digits, so that the rows line up.
+int decimals_of(const std::vector<LadderRow>& rows, double per_newton) {
+  double largest = 0;
+  for (const LadderRow& row : rows)
+    largest = std::max({largest, row.fit_rmse_N, row.select_rmse_N, row.test_rmse_N});
+  const double digits = std::floor(std::log10(std::max(largest * per_newton, 1e-6)));
+  return static_cast<int>(std::min(std::max(3 - digits, 0.0), 9.0));
+}
+
+/// "imbalance of the rotors 12 -> 3 mN on the select flights, 12.2 -> 3.1 mN on the test flights"
+std::string measure_words(const stability::LadderMeasure& measure, const residuals::ForceUnit& unit) {
+  const auto [factor, name] = shown_unit(measure.unit, {unit.name, unit.size_N});
+  const auto words = [&, factor = factor, name = name](const std::array<double, 2>& of, const char* where) {
+    return fmt::format("{:.4g} -> {:.4g} {} on the {} flights", factor * of[0], factor * of[1], name, where);
+  };
+  return measure.quantity + " " + words(measure.select, "select") +
+         (measure.test[0] > 0 ? ", " + words(measure.test, "test") : "");
 }
 
 }  // namespace
@@ -101,27 +123,28 @@ void describe(files::Record& record, const AddResult& result) {
   });
 }
 
-std::string measure_words(const stability::LadderMeasure& measure) {
-  std::string words = fmt::format("{} {:.4g} -> {:.4g} {} on the select flights", measure.quantity,
-                                  measure.select[0], measure.select[1], measure.unit);
-  if (measure.test[0] > 0)
-    words += fmt::format(", {:.4g} -> {:.4g} on the test flights", measure.test[0], measure.test[1]);
-  return words;
-}
-
-void print_ladder(const std::vector<LadderRow>& rows) {
-  fmt::print("  {:<18}{:>10}{:>10}{:>10}{:>14}\n", "", "fit", "select", "test", "test / floor");
+Table ladder_table(const std::vector<LadderRow>& rows, const residuals::ForceUnit& unit) {
+  const std::string of = std::string(" [") + unit.name + "]";
+  Table table = {{"", "fit" + of, "select" + of, "test" + of, "test / noise", "note"}, {}};
+  const int decimals = decimals_of(rows, unit.per_newton());
+  const auto error = [&](double rmse_N) {
+    return rmse_N > 0 ? fmt::format("{:.{}f}", unit.per_newton() * rmse_N, decimals) : "-";
+  };
   for (const LadderRow& row : rows) {
-    fmt::print("  {:<18}{:>10.5f}{:>10.5f}{:>10}{:>14}{}\n",
-               (row.effect == "nominal" ? "" : "+ ") + row.effect, row.fit_rmse_N, row.select_rmse_N,
-               row.test_rmse_N > 0 ? fmt::format("{:.5f}", row.test_rmse_N) : "-",
-               row.noise_floor_N > 0 && row.test_rmse_N > 0
-                   ? fmt::format("{:.2f}", row.test_rmse_N / row.noise_floor_N)
-                   : "-",
-               row.note.empty() ? "" : (row.accepted ? "  kept although " : "  refused: ") + row.note);
+    const bool has_ratio = row.noise_floor_N > 0 && row.test_rmse_N > 0;
+    const std::string note = row.note.empty() ? row.measure ? measure_words(*row.measure, unit) : ""
+                                              : (row.accepted ? "kept although " : "refused: ") + row.note;
+    table.rows.push_back({(row.effect == "nominal" ? "" : "+ ") + row.effect, error(row.fit_rmse_N),
+                          error(row.select_rmse_N), error(row.test_rmse_N),
+                          has_ratio ? fmt::format("{:.2f}", row.test_rmse_N / row.noise_floor_N) : "-",
+                          note});
   }
-  for (const LadderRow& row : rows)
-    if (row.measure && row.accepted) fmt::print("  {}: {}\n", row.effect, measure_words(*row.measure));
+  const bool has_notes =
+      std::any_of(table.rows.begin(), table.rows.end(), [](const auto& row) { return !row.back().empty(); });
+  if (!has_notes) table.header.pop_back();
+  for (auto& row : table.rows)
+    if (!has_notes) row.pop_back();
+  return table;
 }
 
 std::string what_rows_measure(const std::vector<stability::LadderRow>& rows) {
@@ -129,17 +152,17 @@ std::string what_rows_measure(const std::vector<stability::LadderRow>& rows) {
   return is_balance ? "force by which each rotor is off balance" : "force residual";
 }
 
-void print_ladder(const Ladder& ladder) {
+void print_ladder(const Ladder& ladder, const residuals::ForceUnit& unit) {
   if (!ladder.earlier.empty()) {
     fmt::print("The model's ladder so far, on the flights of then:\n");
-    print_ladder(ladder.earlier);
+    fmt::print("{}", to_text(ladder_table(ladder.earlier, unit)));
   }
   static constexpr const char* kSplitWords[] = {"", ", which are parts of flights",
                                                 " (too little to split: all for everything)"};
-  fmt::print("RMSE of the {}, in newton; flights for fit / select / test: {} / {} / {}{}\n",
+  fmt::print("RMSE of the {}; flights for fit / select / test: {} / {} / {}{}\n",
              what_rows_measure(ladder.rows), ladder.split.fit.size(), ladder.split.select.size(),
              ladder.split.test.size(), kSplitWords[static_cast<std::size_t>(ladder.split.by)]);
-  print_ladder(ladder.rows);
+  fmt::print("{}", to_text(ladder_table(ladder.rows, unit)));
   fmt::print("Test flights looked at: {} time{}\n", ladder.test_looks, ladder.test_looks == 1 ? "" : "s");
   if (!ladder.stopped.empty()) fmt::print("It stopped there: {}\n", ladder.stopped);
   for (const stability::EffectSpec& effect : ladder.model.effects) {

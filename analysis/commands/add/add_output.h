@@ -8,6 +8,8 @@
 #include "analysis/identification/clocks/clock_offset.h"
 #include "analysis/identification/labels/mislabelled.h"
 #include "analysis/identification/ladder.h"
+#include "analysis/report/table.h"
+#include "analysis/residuals/force_unit.h"
 #include "nn/base/record.h"
 
 namespace swarmcert::analysis {
@@ -39,14 +41,11 @@ struct AddResult {
 };
 void describe(files::Record& record, const AddResult& result);
 
-/// Returns "imbalance of the rotors 0.012 -> 0.003 N on the select flights, ...".
-std::string measure_words(const stability::LadderMeasure& measure);
-
-/// Prints the ladder as text.
-void print_ladder(const std::vector<stability::LadderRow>& rows);
+/// Returns a row per step: its errors, "-" where nothing was held out, and why it was refused, or what decided instead.
+Table ladder_table(const std::vector<stability::LadderRow>& rows, const residuals::ForceUnit& unit);
 /// Says which quantity the errors of the rows measure: the force residual, or the balance of the rotors where that
 /// was fitted.
 std::string what_rows_measure(const std::vector<stability::LadderRow>& rows);
-void print_ladder(const identification::Ladder& ladder);
+void print_ladder(const identification::Ladder& ladder, const residuals::ForceUnit& unit);
 
 }  // namespace swarmcert::analysis

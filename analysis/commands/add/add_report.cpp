@@ -2,9 +2,6 @@
 
 #include <fmt/core.h>
 
-#include <algorithm>
-#include <cmath>
-
 #include "analysis/cli/command_line.h"
 #include "analysis/commands/add/add_output.h"
 #include "analysis/commands/shared/effect_output.h"
@@ -14,40 +11,19 @@
 #include "analysis/report/report_text.h"
 
 namespace swarmcert::analysis {
-namespace {
-
-std::string step(const stability::LadderRow& row) {
-  return (row.effect == "nominal" ? "" : row.accepted ? "+ " : "refused: ") + row.effect;
-}
-
-/// Number of decimals with which the largest error has four digits, so that the rows line up.
-int decimals_of(const std::vector<stability::LadderRow>& rows, double per_newton) {
-  double largest = 0;
-  for (const stability::LadderRow& row : rows)
-    largest = std::max({largest, row.fit_rmse_N, row.select_rmse_N, row.test_rmse_N});
-  const double digits = std::floor(std::log10(std::max(largest * per_newton, 1e-6)));
-  return static_cast<int>(std::min(std::max(3 - digits, 0.0), 9.0));
-}
-
-}  // namespace
-
 void add_ladder_figure(Report& report, const std::vector<stability::LadderRow>& rows, const std::string& name,
                        const residuals::ForceUnit& force) {
   const std::string unit = force.name;
   const double per_newton = force.per_newton();
   std::string data = "# fit select test step\n";
-  std::vector<std::vector<std::string>> cells;
-  const int decimals = decimals_of(rows, per_newton);
   for (const stability::LadderRow& row : rows) {
+    const auto error = [&](double rmse_N) {
+      return rmse_N > 0 ? fmt::format("{:.8g}", per_newton * rmse_N) : "NaN";
+    };
     if (row.accepted && !row.measure)
       data +=
-          fmt::format("{:.8g} {:.8g} {:.8g} {}\n", per_newton * row.fit_rmse_N,
-                      per_newton * row.select_rmse_N, per_newton * row.test_rmse_N, plot_field(step(row)));
-    cells.push_back({step(row), fmt::format("{:.{}f}", per_newton * row.fit_rmse_N, decimals),
-                     fmt::format("{:.{}f}", per_newton * row.select_rmse_N, decimals),
-                     fmt::format("{:.{}f}", per_newton * row.test_rmse_N, decimals),
-                     row.noise_floor_N > 0 ? fmt::format("{:.2f}", row.test_rmse_N / row.noise_floor_N) : "-",
-                     row.measure && row.note.empty() ? measure_words(*row.measure) : row.note});
+          fmt::format("{} {} {} {}\n", error(row.fit_rmse_N), error(row.select_rmse_N),
+                      error(row.test_rmse_N), plot_field((row.effect == "nominal" ? "" : "+ ") + row.effect));
   }
   report.figure(
       name, data,
@@ -59,9 +35,7 @@ void add_ladder_figure(Report& report, const std::vector<stability::LadderRow>& 
           "'' using 2 title 'flights to select' linetype 6, '' using 3 title 'test flights' linetype 1\n",
       "Error ladder: how the error of the force falls from the nominal model on, effect by effect, on the "
       "fitted, the selecting and the test flights.");
-  report.table({"", "fit [" + unit + "]", "select [" + unit + "]", "test [" + unit + "]",
-                "test / noise floor", "note"},
-               cells);
+  report.table(ladder_table(rows, force));
 }
 
 std::string write_ladder_report(const std::vector<LadderOfModel>& ladders, const BeforeAfter* change,

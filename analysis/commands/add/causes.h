@@ -37,8 +37,9 @@ void describe(files::Record& record, const Cause& cause);
 /// Returns the accepted effects, formulas and shapes of `ladder`, in the order in which they were accepted.
 std::vector<Cause> causes_of(const identification::Ladder& ladder);
 
-/// Returns the cause with its fitted values and 90 % intervals: "drag_linear: k_N_s_m = 0.021 (0.019 .. 0.023); lowers
-/// the error by 12 %, 8.1 to 7.1 mN". The equation is not part of it.
+/// Returns the cause with its fitted values and 90 % intervals: "drag_linear: a drag of 0.021 N s/m times
+/// the velocity; drag_N_s_m = 0.021 (0.019 .. 0.023); lowers the error by 12 %, 8.1 to 7.1 mN". The equation is not
+/// part of it.
 std::string sentence(const Cause& cause, const residuals::ForceUnit& unit);
 
 /// Returns on what the errors of causes were measured: "flights that nothing was fitted to".

@@ -272,6 +272,9 @@ int run_bound(const BoundOptions& options, const CommonOptions& common) {
     if (result.certificate) print_certificate_summary(*result.certificate, options.certificate);
     if (!report_path.empty()) fmt::print("\nreport: {}\n", report_path);
   }
+  const bool flies = result.answer.flies.value_or(false);
+  print_next(common, {flies ? "iss-check" : "tune", "--gains", options.tracking.gains, "--model",
+                      options.tracking.model});
   return exit_code(result);
 }
 

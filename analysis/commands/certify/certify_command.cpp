@@ -365,6 +365,13 @@ int run_certify(CertifyOptions options, const CommonOptions& common) {
     const std::string path = write_certify_report(network, output, result, options.report, common.force);
     if (common.prints_text()) fmt::print("report: {}\n", path);
   }
+  std::vector<std::string> next = network_words(options.network);
+  if (options.output.empty())
+    next.insert(next.end(), {"-o", "certificate.json"});
+  else
+    next.insert(next.begin(), options.output);
+  next.insert(next.begin(), options.output.empty() ? "certify" : "check");
+  print_next(common, next);
   return output.verdict == Verdict::kProved    ? kDone
          : output.verdict == Verdict::kRefuted ? kViolated
                                                : kInconclusive;

@@ -158,6 +158,12 @@ int run_check(const CheckOptions& options, const CommonOptions& common) {
       fmt::print("rejected: {}\n", verdict.reason);
     }
   }
+  if (verdict.accepted) {
+    std::vector<std::string> next = network_words(options.network);
+    next.insert(next.begin(), "export");
+    next.insert(next.end(), {"--certificate", options.certificate, "-o", "firmware"});
+    print_next(common, next);
+  }
   return verdict.accepted ? kDone : kViolated;
 }
 

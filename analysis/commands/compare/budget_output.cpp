@@ -66,11 +66,11 @@ void describe_budget(files::Record& record, const Budget& budget) {
              "Error of the last model row over the network's.");
 }
 
-void print(const Budget& budget) {
+void print(const Budget& budget, const residuals::ForceUnit& unit) {
   fmt::print(
-      "\nError budget: root mean square of the vertical residual [gf]; fitted to {} flights, judged on "
+      "\nError budget: root mean square of the vertical residual [{}]; fitted to {} flights, judged on "
       "{}\n{:<12}",
-      budget.fit_flights, budget.test_flights, "");
+      unit.name, budget.fit_flights, budget.test_flights, "");
   for (const auto& [group, statistics] : budget.rows[0].of)
     fmt::print("{:>{}}", group, group.size() > 6 ? group.size() + 2 : 8);
   fmt::print("\n");
@@ -84,7 +84,7 @@ void print(const Budget& budget) {
   for (const BudgetRow& row : budget.rows) {
     const bool adds = row.name != "nominal" && row.name != "network";
     line((adds ? "+ " : "") + row.name,
-         [&](const std::string& group) { return rmse_z(row, group) / stability::kGramForce_N; }, "{:.2f}");
+         [&](const std::string& group) { return rmse_z(row, group) * unit.per_newton(); }, "{:.2f}");
   }
   line(
       "drop [%]", [&](const std::string& group) { return 100 * drop(budget, group); }, "{:.0f}");

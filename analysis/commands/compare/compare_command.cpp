@@ -235,7 +235,7 @@ int run_compare(const CompareOptions& options, const CommonOptions& common) {
   constexpr std::size_t kOfOnePass_bytes = std::size_t{64} << 20;
   if (options.budget.empty() && options.inject.empty() && options.promise.empty())
     inputs.cache = std::make_shared<residuals::LogCache>(inputs.rules.per_mass, kOfOnePass_bytes);
-  const residuals::ForceUnit unit = page_unit(options.flights, inputs);
+  const residuals::ForceUnit unit = result.unit = unit_of(options.flights, inputs);
   check_kinds(gains, inputs);
   Progress progress(common.quiet);
   const auto show = [&](int done, int total) { progress.show(done, total, "flights"); };
@@ -255,9 +255,9 @@ int run_compare(const CompareOptions& options, const CommonOptions& common) {
   const files::Node described = result_of("compare", files, std::nullopt, result);
   write_result(common, described);
   if (common.prints_text()) {
-    print_comparison(result.comparison, inputs, result.own ? &*result.own : nullptr);
+    print_comparison(result.comparison, inputs, result.own ? &*result.own : nullptr, unit);
     if (result.promise) print_promise_kept(*result.promise);
-    if (result.budget) print(*result.budget);
+    if (result.budget) print(*result.budget, unit);
     if (result.prediction) print_prediction(*result.prediction);
     const std::chrono::duration<double> run = std::chrono::steady_clock::now() - start;
     if (inputs.found.flights.size() > 1)
@@ -284,8 +284,7 @@ Command compare_command() {
       "compare", "Compare a model with flights: force residuals, and where the model fails",
       "Records on the ground, after a crash, with rotors off, after gaps and without a known neighbour are "
       "cut;\n"
-      "the result counts them. Forces are in newton in the JSON, on the terminal in gram-force for vehicles "
-      "below 1 N, else in newton.\n\n"
+      "the result counts them. Forces are in newton in the JSON, and in one unit in text and pages.\n\n"
       "Example: swarmcert compare stability/models/crazyflie-small.toml flights/ --report out\n"
       "         swarmcert compare flights/ --network network.toml --published-filter\n"
       "         swarmcert compare test/ --budget development/ --network network.toml\n"
@@ -296,7 +295,7 @@ Command compare_command() {
         const auto options = std::make_shared<CompareOptions>();
         declare_flights(app, options->flights, true);
         add_output(app, "--report", options->report, "Write an HTML report into this folder");
-        declare_unit(app, options->flights, "");
+        declare_unit(app, options->flights);
         declare_no_embed(app, options->flights);
         app.add_option(
             "--gains", options->gains,

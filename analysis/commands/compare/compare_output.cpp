@@ -11,6 +11,7 @@
 #include "analysis/cli/counted.h"
 #include "analysis/commands/compare/compare_result.h"
 #include "analysis/commands/compare/log_output.h"
+#include "analysis/commands/shared/character_plot.h"
 #include "analysis/commands/shared/flight_options.h"
 #include "analysis/residuals/failing_place.h"
 
@@ -65,10 +66,10 @@ void print_trajectories(const residuals::Trajectories& all) {
 
 void print_compositions(const Comparison& comparison, const Comparison* own,
                         const residuals::ForceUnit& unit) {
-  fmt::print("\n{:<28}{:>9}{:>16}{}\n", "Kinds: neighbours 2 vehicle", "records",
-             fmt::format("z, mean [{}^2]", unit.name), own != nullptr ? "   with own filter" : "");
+  fmt::print("\n{:<28}{:>9}{:>16}{}\n", "Mean square by kinds", "records", fmt::format("z [{}^2]", unit.name),
+             own != nullptr ? "   with own filter" : "");
   for (const auto& [name, group] : comparison.compositions) {
-    fmt::print("{:<28}{:>9}{:>16.2f}", name, group.statistics.samples,
+    fmt::print("{:<28}{:>9}{:>16.2f}", comparison.composition_words.at(name), group.statistics.samples,
                std::pow(group.statistics.rmse.z / unit.size_N, 2));
     if (own != nullptr) {
       const auto same = own->compositions.find(name);
@@ -99,18 +100,16 @@ void print_errors(const Comparison& comparison, const Comparison* own, const res
   line("all", comparison.overall);
   if (!per_mass || comparison.compositions.size() > 1) print_compositions(comparison, own, unit);
   const auto& interval = comparison.overall.rmse_interval;
-  fmt::print("\nRMSE of all: {:.4f} {}, {}; {:.1f} % of the weight.\n",
-             comparison.overall.statistics.rmse.total, per_mass ? unit.name : "N",
+  fmt::print("\nRMSE of all: {:.3g} {}, {}; {:.1f} % of the weight.\n",
+             unit.per_newton() * comparison.overall.statistics.rmse.total, unit.name,
              interval
-                 ? fmt::format("90 % interval {:.4f} .. {:.4f}", (*interval)[3].lower, (*interval)[3].upper)
+                 ? fmt::format("90 % interval {:.3g} .. {:.3g}", unit.per_newton() * (*interval)[3].lower,
+                               unit.per_newton() * (*interval)[3].upper)
                  : "no interval: too short a flight",
              100 * comparison.overall.nrmse.total);
-  const residuals::FailingPlace fails = residuals::failing_place(comparison, unit);
-  fmt::print("\nWhere it fails most: {}\n", per_mass ? "by regime" : fails.words);
-  const bool is_regional = per_mass || fails.where == residuals::FailingPlace::Where::kRegion;
-  for (std::size_t i = 0; i < comparison.regions.size() && i < 8 && is_regional; ++i) {
-    const residuals::RegionErrors& region = comparison.regions[i];
-    fmt::print("  {} ({} records)\n", region.words, region.statistics.samples);
+  if (!per_mass) {
+    const residuals::FailingPlace fails = residuals::failing_place(comparison, unit);
+    fmt::print("\n{}\n{}", sentence(fails), character_plot(comparison, fails, unit));
   }
   if (!comparison.moments.empty()) {
     const residuals::Moment& worst = comparison.moments[0];
@@ -133,7 +132,8 @@ std::string vehicles_without_model(const residuals::Inputs& inputs) {
 
 }  // namespace
 
-void print_comparison(const Comparison& comparison, const residuals::Inputs& inputs, const Comparison* own) {
+void print_comparison(const Comparison& comparison, const residuals::Inputs& inputs, const Comparison* own,
+                      const residuals::ForceUnit& unit) {
   for (const stability::Model& model : inputs.models) {
     if (inputs.rules.per_mass) break;
     fmt::print("Model {}: {}, {}, {}\n", model.path, model.kind, residuals::mass_text(model.mass_kg),
@@ -151,7 +151,7 @@ void print_comparison(const Comparison& comparison, const residuals::Inputs& inp
     fmt::print("flights.toml: [log.\"{}\"] matches none of these logs.\n", pattern);
   print_cuts(comparison);
   if (comparison.overall.statistics.samples > 0)
-    print_errors(comparison, own, residuals::force_unit(inputs), inputs.rules.per_mass);
+    print_errors(comparison, own, unit, inputs.rules.per_mass);
   else if (std::any_of(comparison.tracks.begin(), comparison.tracks.end(),
                        [](const residuals::TrackErrors& track) { return !track.position_only; }))
     print_torque(comparison);

@@ -12,6 +12,7 @@
 #include "analysis/commands/shared/report_head.h"
 #include "analysis/commands/shared/time_plots.h"
 #include "analysis/report/report.h"
+#include "analysis/residuals/failing_place.h"
 #include "analysis/residuals/force_unit.h"
 
 namespace swarmcert::analysis {
@@ -21,12 +22,6 @@ namespace {
 std::string in_unit(double newton, const residuals::ForceUnit& unit) {
   const double value = newton / unit.size_N;
   return std::abs(value) < 1 ? fmt::format("{:.3g}", value) : fmt::format("{:.2f}", value);
-}
-
-std::string words_of(const residuals::RegionErrors& region, const residuals::ForceUnit& unit) {
-  const residuals::Axes& bias = region.statistics.bias;
-  return fmt::format("{}: {} {} up, {} sideways", residuals::region_name(region.variable, region.region),
-                     in_unit(bias.z, unit), unit.name, in_unit(std::hypot(bias.x, bias.y), unit));
 }
 
 std::vector<std::string> row(const std::string& name, const residuals::GroupErrors& group,
@@ -195,16 +190,17 @@ std::string write_compare_report(const CompareResult& result,
   for (const auto& [name, errors] : comparison.vehicles) rows.push_back(row(name, errors, unit));
   rows.push_back(row("all", comparison.overall, unit));
   report.table(kHeader, rows);
-  report.paragraph("By kinds of the neighbours, then of the vehicle; Ge flies alone:");
+  report.paragraph("By kinds of vehicles:");
   rows.clear();
-  for (const auto& [name, errors] : comparison.compositions) rows.push_back(row(name, errors, unit));
+  for (const auto& [name, errors] : comparison.compositions)
+    rows.push_back(row(comparison.composition_words.at(name), errors, unit));
   report.table(kHeader, rows);
 
   report.heading("Where the model fails");
   rows.clear();
   for (std::size_t i = 0; i < comparison.regions.size() && i < 12; ++i) {
     const residuals::RegionErrors& region = comparison.regions[i];
-    rows.push_back({words_of(region, unit), std::to_string(region.statistics.samples),
+    rows.push_back({residuals::region_words(region, unit), std::to_string(region.statistics.samples),
                     in_unit(region.statistics.rmse.total, unit),
                     fmt::format("{:.1f} %", 100 * region.share)});
   }

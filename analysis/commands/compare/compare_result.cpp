@@ -375,13 +375,12 @@ void describe_comparison(Record& record, const CompareResult& result) {
   record.field("mean_square_z_gf2", per_mass ? std::nullopt : std::optional(mean_squares_gf2(comparison)),
                "Mean square of the vertical residual by composition.", "gf^2");
   record.may("fails",
-             per_mass ? std::nullopt
-                      : std::optional(residuals::failing_place(comparison, residuals::force_unit(inputs))),
+             per_mass ? std::nullopt : std::optional(residuals::failing_place(comparison, result.unit)),
              "Where the model fails, in one line.");
   record.list("regions", comparison.regions, "Where the model fails, worst first.",
-              [&judged](Record& r, const residuals::RegionErrors& region) {
+              [&](Record& r, const residuals::RegionErrors& region) {
                 r.field("variable", residuals::variable_name(region.variable), "");
-                r.field("words", region.words, "");
+                r.field("words", residuals::region_words(region, result.unit), "");
                 r.field("share", region.share, "Of all squared residual that this region's bias explains.");
                 describe_statistics(r, region.statistics, judged);
               });

@@ -11,6 +11,7 @@
 #include "analysis/identification/budget.h"
 #include "analysis/residuals/comparison.h"
 #include "analysis/residuals/flight_errors.h"
+#include "analysis/residuals/force_unit.h"
 #include "analysis/tracking/kept_promise.h"
 #include "nn/base/record.h"
 
@@ -37,6 +38,7 @@ struct JudgedPromise {
 struct CompareResult {
   residuals::Comparison comparison;
   residuals::Inputs inputs;
+  residuals::ForceUnit unit;  ///< of words; numbers are in newton
   std::optional<ErrorsOfFlights> errors;
   std::optional<residuals::Comparison> own;  ///< with this tool's filter instead of the published one
   std::optional<identification::Budget> budget;

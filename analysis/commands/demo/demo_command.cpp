@@ -128,7 +128,7 @@ std::string study_flights(const fs::path& folder, const CommonOptions& common, c
   const identification::Study study = identification::study(
       inputs, std::nullopt, common.jobs,
       [&](int done, int total, const std::string& what) { progress.show(done, total, what); });
-  const residuals::ForceUnit unit = residuals::chosen_force_unit("N", inputs.models[0]);
+  const residuals::ForceUnit unit = residuals::force_unit("", inputs.models);
   const StudyResult answer = study_result(study, unit, next_of_study(study, {}, inputs, output));
   const std::string sentence = headline(answer, unit);
   say("   " + sentence);

@@ -44,7 +44,7 @@ struct Answers {
 std::vector<std::string> all_next_flights(const std::vector<Diagnosis>& diagnoses) {
   std::vector<std::string> next;
   for (const Diagnosis& diagnosis : diagnoses)
-    for (std::string& flight : next_flights(diagnosis)) next.push_back(std::move(flight));
+    for (std::string& flight : next_flights(diagnosis, true)) next.push_back(std::move(flight));
   return next;
 }
 
@@ -82,9 +82,9 @@ Answers answer(const DiagnoseOptions& options, const CommonOptions& common, cons
   return answers;
 }
 
-void print(const Answers& answers) {
+void print(const Answers& answers, const residuals::ForceUnit& unit) {
   for (std::size_t i = 0; i < answers.diagnoses.size(); ++i) {
-    print_diagnosis(answers.diagnoses[i]);
+    print_diagnosis(answers.diagnoses[i], unit);
     if (!answers.differences.empty()) fmt::print("  {}\n", in_words(answers.differences[i]));
   }
   for (const identification::Each& each : answers.each) print_each(each);
@@ -98,7 +98,7 @@ int run_diagnose(const DiagnoseOptions& options, const CommonOptions& common) {
       identification::find_and_correct_labels(inputs, common.jobs);
   const std::vector<identification::ClockOffset> clocks =
       identification::find_and_correct_clocks(inputs, common.jobs);
-  const residuals::ForceUnit unit = page_unit(options.flights, inputs);
+  const residuals::ForceUnit unit = unit_of(options.flights, inputs);
   std::vector<std::string> files = inputs.files(), other_files;
   std::optional<residuals::Inputs> others;
   if (!options.against.empty()) {
@@ -109,8 +109,11 @@ int run_diagnose(const DiagnoseOptions& options, const CommonOptions& common) {
   }
   Answers answers = answer(options, common, inputs, others ? &*others : nullptr);
   const bool prints = common.prints_text();
-  if (prints) print(answers);
   DiagnoseResult result;
+  if (!others)
+    result.fails = residuals::failing_place(residuals::compare(inputs, common.jobs, [](int, int) {}), unit);
+  if (prints && result.fails) fmt::print("{}\n", sentence(*result.fails));
+  if (prints) print(answers, unit);
   result.found = diagnosed(answers.diagnoses);
   Judgement& judgement = result.found.judgement;
   if (others) {
@@ -139,9 +142,13 @@ int run_diagnose(const DiagnoseOptions& options, const CommonOptions& common) {
   if (prints) fmt::print("verdict: {}\n", name(judgement.verdict));
   const bool has_more = judgement.verdict == identification::Verdict::kMissingEffect ||
                         judgement.verdict == identification::Verdict::kUnexplained;
-  if (prints && !others && has_more && inputs.models.size() == 1)
-    fmt::print("Next: {}\n", next_command("add", {"auto", "--model", inputs.models[0].path}, options.flights,
-                                          inputs, {"-o", "fitted.toml"}));
+  if (prints && !others && inputs.models.size() == 1) {
+    const std::string& model = inputs.models[0].path;
+    fmt::print("Next: {}\n", has_more ? next_command("add", {"auto", "--model", model}, options.flights,
+                                                     inputs, {"-o", "fitted.toml"})
+                                      : next_command("compare", {model}, options.flights, inputs,
+                                                     {"--json", "errors.json"}));
+  }
   if (!options.report.empty()) {
     std::vector<std::string> notes;
     for (const identification::Mislabelled& label : labels) notes.push_back(sentence(label));

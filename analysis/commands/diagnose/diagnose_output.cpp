@@ -15,10 +15,10 @@ namespace {
 using identification::Diagnosis;
 using identification::Missing;
 
-void print(const Missing& missing, int flights) {
+void print(const Missing& missing, int flights, const residuals::ForceUnit& unit) {
   const identification::Finding& finding = missing.finding;
-  fmt::print("  {:<15} RMSE {:.5f} -> {:.5f} N ({:.1f} %, 90 %: {:.1f} .. {:.1f})\n", missing.effect,
-             finding.rmse_before_N, finding.rmse_after_N,
+  fmt::print("  {:<15} RMSE {:.4g} -> {:.4g} {} ({:.1f} %, 90 %: {:.1f} .. {:.1f})\n", missing.effect,
+             unit.per_newton() * finding.rmse_before_N, unit.per_newton() * finding.rmse_after_N, unit.name,
              100 * (1 - finding.rmse_after_N / finding.rmse_before_N), 100 * finding.drop_interval.lower,
              100 * finding.drop_interval.upper);
   if (is_sensor_error(missing.effect)) fmt::print("    {}\n", sensor_words(missing.effect));
@@ -40,7 +40,46 @@ void print(const Missing& missing, int flights) {
 
 }  // namespace
 
-void print_diagnosis(const Diagnosis& diagnosis) {
+std::string varies_with(const Diagnosis& diagnosis) {
+  const auto& entries = diagnosis.scan.entries;
+  return entries.empty() || entries[0].share < identification::kMuchOfForce ? "" : entries[0].variable;
+}
+
+std::vector<std::string> left_sentences(const Diagnosis& diagnosis, const residuals::ForceUnit& unit) {
+  std::vector<std::string> sentences;
+  for (const std::string& effect : diagnosis.contradicted)
+    sentences.push_back(
+        fmt::format("Not counted: {} fits, but not along the set points: it is the controller's response to "
+                    "something else.",
+                    effect));
+  for (const std::string& effect : diagnosis.suspected) {
+    const std::vector<std::string>& at_bound = diagnosis.at_bound;
+    sentences.push_back(
+        fmt::format("Not counted: {} {}.", effect,
+                    std::find(at_bound.begin(), at_bound.end(), effect) != at_bound.end()
+                        ? "ends at its bound: not identified"
+                        : "fits, but explains little of the remainder, another form explains more, or set "
+                          "points do not confirm it"));
+  }
+  if (diagnosis.thrust_scale.is_known) {
+    const identification::InstrumentedValue& scale = diagnosis.thrust_scale.value;
+    sentences.push_back(fmt::format(
+        "Thrust scale: {:.3f} by least squares, {:.3f} by instrument (90 %: {:.3f} .. {:.3f}).",
+        1 + scale.least_squares, 1 + scale.instrument, 1 + scale.interval.lower, 1 + scale.interval.upper));
+  }
+  const identification::Remainder& rest = diagnosis.remainder;
+  sentences.push_back(
+      fmt::format("Left: {:.4g} {} (noise {:.3g}); {}.", unit.per_newton() * diagnosis.rmse_after_N,
+                  unit.name, unit.per_newton() * std::sqrt(rest.floor_N2),
+                  varies_with(diagnosis).empty() && !rest.stands_out() ? "nothing stands out"
+                                                                       : "not everything is explained"));
+  if (rest.line.is_found())
+    sentences.push_back(fmt::format("A vibration at {:.1f} Hz is {:.0f} % of what is left along {}.",
+                                    rest.line.frequency_hz, 100 * rest.line.share, "xyz"[rest.line.axis]));
+  return sentences;
+}
+
+void print_diagnosis(const Diagnosis& diagnosis, const residuals::ForceUnit& unit) {
   fmt::print(
       "{} {}: {} records, {} blocks of 2 s.\n", diagnosis.vehicle.empty() ? "Vehicles of kind" : "Vehicle",
       diagnosis.vehicle.empty() ? diagnosis.kind : diagnosis.vehicle, diagnosis.records, diagnosis.blocks);
@@ -53,49 +92,23 @@ void print_diagnosis(const Diagnosis& diagnosis) {
     fmt::print("  No answer: {}.\n", diagnosis.too_poor);
     return;
   }
-  if (diagnosis.ranking.empty()) {
-    fmt::print("  {}\n", diagnosis.remainder.stands_out()
-                             ? "No effect of the library explains the remainder."
-                             : "No effect of the library is missing above the sizes below.");
-  }
-  for (const Missing& missing : diagnosis.ranking) print(missing, diagnosis.flights);
-  for (const std::string& effect : diagnosis.contradicted) {
-    fmt::print(
-        "  Not counted: {} fits, but not along the set points: it is the controller's response to something "
-        "else\n",
-        effect);
-  }
-  for (const std::string& effect : diagnosis.suspected) {
-    const std::vector<std::string>& at_bound = diagnosis.at_bound;
-    fmt::print("  Not counted: {} {}\n", effect,
-               std::find(at_bound.begin(), at_bound.end(), effect) != at_bound.end()
-                   ? "ends at its bound: not identified"
-                   : "fits, but explains little of the remainder, another form explains more, or set points "
-                     "do not confirm it");
-  }
-  if (diagnosis.thrust_scale.is_known) {
-    const identification::InstrumentedValue& scale = diagnosis.thrust_scale.value;
-    fmt::print("  Thrust scale: {:.3f} by least squares, {:.3f} by instrument (90 %: {:.3f} .. {:.3f})\n",
-               1 + scale.least_squares, 1 + scale.instrument, 1 + scale.interval.lower,
-               1 + scale.interval.upper);
-  }
-  const identification::Remainder& rest = diagnosis.remainder;
-  fmt::print("  Left: {:.5f} N; low frequencies {:.1f} times the noise floor{}", diagnosis.rmse_after_N,
-             rest.ratio, rest.stands_out() ? ": not everything is explained" : "");
-  for (std::size_t i = 0; i < rest.depends_on.size(); ++i)
-    fmt::print("{}{}", i == 0 ? ", depends on " : ", ", rest.depends_on[i]);
-  fmt::print("\n");
-  if (rest.line.is_found())
-    fmt::print("  A vibration at {:.1f} Hz is {:.0f} % of what is left along {}.\n", rest.line.frequency_hz,
-               100 * rest.line.share, "xyz"[rest.line.axis]);
-  print_remainder(diagnosis);
-  fmt::print("  Shown in 9 of 10 injections (open loop), if at least as large as:\n");
+  if (diagnosis.ranking.empty()) fmt::print("  {}\n", no_effect_words(diagnosis));
+  for (const Missing& missing : diagnosis.ranking) print(missing, diagnosis.flights, unit);
+  for (const std::string& sentence : left_sentences(diagnosis, unit)) fmt::print("  {}\n", sentence);
+  print_remainder(diagnosis, unit);
+  fmt::print("  {}:\n", kDetectableWords);
   for (const identification::Detectable& entry : diagnosis.detectable) {
     if (std::isfinite(entry.size))
       fmt::print("    {} {} = {:.3g}\n", entry.effect, entry.parameter, entry.size);
     else
       fmt::print("    {} {}: not at any size; fly {}\n", entry.effect, entry.parameter, entry.excitation);
   }
+}
+
+std::string no_effect_words(const Diagnosis& diagnosis) {
+  return identification::leaves_something(diagnosis)
+             ? "No effect of the library explains the remainder."
+             : "No effect of the library is missing above the sizes below.";
 }
 
 std::string in_words(const identification::Difference& difference) {
@@ -112,7 +125,7 @@ std::string in_words(const identification::Difference& difference) {
   return text;
 }
 
-std::vector<std::string> next_flights(const Diagnosis& diagnosis) {
+std::vector<std::string> next_flights(const Diagnosis& diagnosis, bool wants_all) {
   std::vector<std::string> next;
   const auto add = [&next](const std::string& flight) {
     if (!flight.empty() && std::find(next.begin(), next.end(), flight) == next.end()) next.push_back(flight);
@@ -126,7 +139,8 @@ std::vector<std::string> next_flights(const Diagnosis& diagnosis) {
                       rival.excitation));
   }
   for (const identification::Detectable& entry : diagnosis.detectable) {
-    if (!std::isfinite(entry.size)) add(fmt::format("to see {} at all: {}", entry.effect, entry.excitation));
+    if (wants_all && !std::isfinite(entry.size))
+      add(fmt::format("to see {} at all: {}", entry.effect, entry.excitation));
   }
   return next;
 }

@@ -11,7 +11,6 @@
 #include "analysis/commands/diagnose/each_output.h"
 #include "analysis/commands/diagnose/remainder_output.h"
 #include "analysis/commands/shared/effect_output.h"
-#include "analysis/identification/verdict.h"
 #include "analysis/report/report.h"
 
 namespace swarmcert::analysis {
@@ -69,29 +68,12 @@ void add_ranking(Report& report, const Diagnosis& diagnosis, const std::string& 
 }
 
 void add_left(Report& report, const Diagnosis& diagnosis, const residuals::ForceUnit& unit) {
-  const identification::Remainder& rest = diagnosis.remainder;
-  report.paragraph(fmt::format(
-      "Left: {:.4g} {}; low frequencies {:.1f} times the noise floor: {}{}",
-      unit.per_newton() * diagnosis.rmse_after_N, unit.name, rest.ratio,
-      identification::leaves_something(diagnosis) ? "not everything is explained" : "nothing stands out",
-      rest.depends_on.empty() ? "." : ". It depends on " + joined(rest.depends_on) + "."));
-  if (!diagnosis.contradicted.empty()) {
-    report.paragraph(
-        "Not counted, because set points contradict them (the controller's response to something else): " +
-        joined(diagnosis.contradicted) + ".");
-  }
-  if (!diagnosis.suspected.empty()) {
-    report.paragraph(
-        "Not counted, because they explain little of the remainder: " + joined(diagnosis.suspected) + ".");
-  }
-  if (diagnosis.thrust_scale.is_known) {
-    const identification::InstrumentedValue& scale = diagnosis.thrust_scale.value;
-    report.paragraph(fmt::format(
-        "Thrust scale: {:.3f} by least squares, {:.3f} by instrument (90 %: {:.3f} .. {:.3f}).",
-        1 + scale.least_squares, 1 + scale.instrument, 1 + scale.interval.lower, 1 + scale.interval.upper));
-  }
-  report.paragraph(
-      "Smallest sizes that these flights show in 9 of 10 injections (open loop: the flight does not react):");
+  for (const std::string& sentence : left_sentences(diagnosis, unit)) report.paragraph(sentence);
+  add_detectable(report, diagnosis);
+}
+
+void add_detectable(Report& report, const Diagnosis& diagnosis) {
+  report.paragraph(std::string(kDetectableWords) + " (open loop: the flight does not react):");
   std::vector<std::vector<std::string>> rows;
   const bool all_show =
       std::all_of(diagnosis.detectable.begin(), diagnosis.detectable.end(),
@@ -129,7 +111,7 @@ std::string write_diagnose_report(const std::vector<Diagnosis>& diagnoses,
     }
     if (!differences.empty()) report.paragraph(in_words(differences[i]));
     if (diagnosis.ranking.empty())
-      report.paragraph("No effect of the library is missing above the sizes below.");
+      report.paragraph(no_effect_words(diagnosis));
     else
       add_ranking(report, diagnosis, "ranking_" + std::to_string(i + 1), unit);
     add_left(report, diagnosis, unit);

@@ -34,4 +34,7 @@ void add_ranking(Report& report, const identification::Diagnosis& diagnosis, con
 /// Adds what remains after the effects found, what was not counted and why, and the detection limits.
 void add_left(Report& report, const identification::Diagnosis& diagnosis, const residuals::ForceUnit& unit);
 
+/// Adds the detection limits alone.
+void add_detectable(Report& report, const identification::Diagnosis& diagnosis);
+
 }  // namespace swarmcert::analysis

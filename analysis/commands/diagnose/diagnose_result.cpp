@@ -194,6 +194,7 @@ void describe(Record& record, const Against& against) {
 }
 
 void describe(Record& record, const DiagnoseResult& result) {
+  record.may("fails", result.fails, "Where the given model fails, in one line; absent with --against.");
   describe(record, result.found);
   record.may("against", result.against, "With --against: what the ranking is the difference from.");
   record.may_fields(result.rotors.has_value(), [&](Record& r) {

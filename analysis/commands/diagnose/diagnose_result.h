@@ -12,6 +12,7 @@
 #include "analysis/identification/fleet/difference.h"
 #include "analysis/identification/fleet/each.h"
 #include "analysis/identification/rotors/rotor_balance.h"
+#include "analysis/residuals/failing_place.h"
 
 namespace swarmcert::analysis {
 
@@ -35,6 +36,7 @@ struct Against {
 void describe(files::Record& record, const Against& against);
 
 struct DiagnoseResult {
+  std::optional<residuals::FailingPlace> fails;  ///< the given model; absent with --against
   Diagnosed found;
   std::optional<Against> against;
   std::optional<std::vector<identification::RotorBalance>> rotors;

@@ -35,6 +35,12 @@ ShownUnit shown_unit(const ScanEntry& entry, const residuals::ForceUnit& force) 
   return entry.rmse_before < 1 ? ShownUnit{"mN m", 1e3} : ShownUnit{"N m", 1};
 }
 
+std::string fall_of(const ScanEntry& entry, const residuals::ForceUnit& force) {
+  const auto [unit_name, per_unit] = shown_unit(entry, force);
+  return fmt::format("{:.4g} -> {:.4g} {}", per_unit * entry.rmse_before, per_unit * entry.rmse_after,
+                     unit_name);
+}
+
 /// Rewrites "m_s" as "m/s".
 std::string with_slash(std::string unit) {
   std::replace(unit.begin(), unit.end(), '_', '/');
@@ -209,7 +215,7 @@ void describe_remainder(files::Record& record, const std::vector<Diagnosis>& dia
               describe_remainder_row);
 }
 
-void print_remainder(const Diagnosis& diagnosis) {
+void print_remainder(const Diagnosis& diagnosis, const residuals::ForceUnit& unit) {
   const std::vector<Listed> entries = all_listed(diagnosis);
   if (entries.empty()) return;
   fmt::print("  The remainder varies with:\n");
@@ -217,11 +223,9 @@ void print_remainder(const Diagnosis& diagnosis) {
   for (const auto& [found, formula] : entries) {
     const ScanEntry& entry = *found;
     if (!shown.has_room(entry)) continue;
-    const std::string errors = is_torque(entry)
-                                   ? fmt::format("{:.2e} -> {:.2e} N m", entry.rmse_before, entry.rmse_after)
-                                   : fmt::format("{:.5f} -> {:.5f} N", entry.rmse_before, entry.rmse_after);
     fmt::print("    {:<34} {:.0f} % of it (90 %: {:.0f} .. {:.0f}), RMSE {}\n", place_of(entry),
-               100 * entry.share, 100 * entry.share_interval.lower, 100 * entry.share_interval.upper, errors);
+               100 * entry.share, 100 * entry.share_interval.lower, 100 * entry.share_interval.upper,
+               fall_of(entry, unit));
     if (formula != nullptr) {
       for (const auto& [target, text] : formula->effect.expression.formulas)
         fmt::print("      {} = {}\n", target, text);
@@ -239,15 +243,12 @@ void add_remainder(Report& report, const Diagnosis& diagnosis, std::size_t numbe
   std::vector<std::vector<std::string>> rows;
   for (const Listed& found : entries) {
     const ScanEntry& entry = *found.entry;
-    const auto [unit_name, per_unit] = shown_unit(entry, unit);
     std::string set_points = verdict_of(entry);
     std::replace(set_points.begin(), set_points.end(), '_', ' ');
     rows.push_back({place_of(entry),
                     fmt::format("{:.1f} % ({:.1f} .. {:.1f})", 100 * entry.share,
                                 100 * entry.share_interval.lower, 100 * entry.share_interval.upper),
-                    fmt::format("{:.4g} -> {:.4g} {}", per_unit * entry.rmse_before,
-                                per_unit * entry.rmse_after, unit_name),
-                    set_points});
+                    fall_of(entry, unit), set_points});
   }
   report.paragraph("The remainder varies with:");
   report.table({"what", "share of the remainder, 90 %", "RMSE", "set points"}, rows);

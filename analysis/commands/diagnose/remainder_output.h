@@ -15,7 +15,7 @@ namespace swarmcert::analysis {
 void describe_remainder(files::Record& record, const std::vector<identification::Diagnosis>& diagnoses);
 
 /// Prints the first few entries, one line each.
-void print_remainder(const identification::Diagnosis& diagnosis);
+void print_remainder(const identification::Diagnosis& diagnosis, const residuals::ForceUnit& unit);
 
 /// Adds a table of the entries, with a figure for the first few.
 /// @param number number of the kind, used in the names of figures.

@@ -37,8 +37,12 @@ void print(const GlossaryEntry& entry) {
 int run_explain(const std::string& word, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
   const Explanation explanation = {word, explain(word)};
-  if (explanation.entries.empty())
-    throw UsageError("explain " + word + ": " + files::did_you_mean(word, glossary_words()));
+  if (explanation.entries.empty()) {
+    const std::string nearest = files::nearest(word, glossary_words());
+    throw UsageError("explain " + word + ": " +
+                     (nearest.empty() ? "no such word; 'swarmcert add --list' lists the effects"
+                                      : "did you mean \"" + nearest + "\"?"));
+  }
   write_result(common, result_of("explain", {}, std::nullopt, explanation));
   if (!common.prints_text()) return kDone;
   for (const GlossaryEntry& entry : explanation.entries) print(entry);

@@ -16,6 +16,50 @@
 namespace swarmcert::analysis {
 namespace {
 
+/// What the texts of the tool call so, beside effects, fields and values.
+struct Term {
+  const char *word, *meaning;
+};
+constexpr Term kTerms[] = {
+    {"residual",
+     "The force that the model does not explain: mass times the measured specific force, less thrust and "
+     "effects of "
+     "the model, in the world frame."},
+    {"RMSE", "Root mean square of an error. Of a force: of the residual vector, unless an axis is named."},
+    {"noise", "The white part of the residual's spectrum: no model can explain it. Also called noise floor."},
+    {"noise floor", "See noise."},
+    {"fit", "Flights, or parts of them, to which parameters are fitted."},
+    {"select", "Flights that no fit has seen and that decide whether a step is accepted."},
+    {"test", "Flights that decide nothing: errors on them say how well the model does on flights to come."},
+    {"held out",
+     "Not seen by any fit: the flights called select and test. A dash: nothing could be held out."},
+    {"ladder",
+     "The errors of a model step by step, as effects are added to it. 'swarmcert add show' prints it."},
+    {"formula",
+     "A short expression of measured variables for a force without a name, found by 'add formula'."},
+    {"shape", "A smooth or monotone curve over one variable, for a force that no formula describes."},
+    {"scan", "The search for variables with which what is left of the force varies."},
+    {"set point",
+     "The position or velocity that the controller was told to reach. A gust moves the vehicle and its "
+     "thrust, but not "
+     "its set points, so they tell causes from the controller's reaction."},
+    {"instrument", "A value estimated along the set points, free of the controller's reaction."},
+    {"injection",
+     "A trial in which an effect of known size is added to the residual of these flights, to see whether it "
+     "is found."},
+    {"vibration",
+     "Force at one frequency above 4 Hz, as of a bent propeller or a loose part. It is named with its "
+     "frequency; no "
+     "effect describes it: mend the vehicle, or log faster."},
+    {"saturation",
+     "Rotors at their largest force: what is asked beyond is not given. The effect thrust_saturation "
+     "describes it, and "
+     "'swarmcert bound' says whether a loop comes to it."},
+    {"witness",
+     "Two inputs, or one, at which a bound is attained as far as stated: no bound can be smaller."},
+    {"golden vectors",
+     "Inputs with the exact outputs of a network, by which compiled code is compared with it."}};
+
 std::string parameter_text(const stability::Parameter& parameter) {
   const std::string size = stability::size_words(parameter.unit);
   return fmt::format("{}: {}, between {:g} and {:g}{}", parameter.name, parameter.meaning, parameter.lower,
@@ -103,7 +147,7 @@ void add_fields(const std::string& word, bool by_name, std::vector<GlossaryEntry
 }  // namespace
 
 void describe(files::Record& record, const GlossaryEntry& entry) {
-  record.field("kind", entry.kind, "effect, field (of a result or file) or value (of a field).");
+  record.field("kind", entry.kind, "word, effect, field (of a result or file) or value (of a field).");
   record.field("name", entry.name, "Of the effect or field.");
   record.field("meaning", entry.meaning, "What the field says.");
   record.field("unit", entry.unit, "Of the field; empty: none, or part of the meaning.");
@@ -130,6 +174,13 @@ std::vector<GlossaryEntry> effect_entries() {
 
 std::vector<GlossaryEntry> explain(const std::string& word) {
   std::vector<GlossaryEntry> entries;
+  for (const Term& term : kTerms) {
+    if (word != term.word) continue;
+    entries.emplace_back();
+    entries.back().kind = "word";
+    entries.back().name = word;
+    entries.back().meaning = term.meaning;
+  }
   for (const GlossaryEntry& effect : effect_entries()) {
     const std::vector<std::string> others = files::split_at(effect.same_as, " / ");
     if (effect.name == word || std::find(others.begin(), others.end(), word) != others.end())
@@ -142,6 +193,7 @@ std::vector<GlossaryEntry> explain(const std::string& word) {
 
 std::vector<std::string> glossary_words() {
   std::vector<std::string> words;
+  for (const Term& term : kTerms) words.emplace_back(term.word);
   for (const GlossaryEntry& effect : effect_entries()) {
     words.push_back(effect.name);
     for (const std::string& name : files::split_at(effect.same_as, " / ")) words.push_back(name);

@@ -10,7 +10,7 @@ namespace swarmcert::analysis {
 
 /// Where a word stands, and what is said of it there. Texts that do not apply are empty.
 struct GlossaryEntry {
-  std::string kind;  ///< "effect", "field" or "value"
+  std::string kind;  ///< "word", "effect", "field" or "value"
   std::string name;
   std::string meaning, unit, guarantee;
   std::vector<std::string> in;  ///< results and files whose field it is, as "compare: overall.rmse"
@@ -28,8 +28,8 @@ struct Explanation {
 };
 void describe(files::Record& record, const Explanation& explanation);
 
-/// Returns every entry about `word`: the effect of that name or class, fields of that name, and fields whose
-/// description mentions it as a value; empty if there is none.
+/// Returns every entry about `word`: what texts call so, the effect of that name or class, fields of that name, and
+/// fields whose description mentions it as a value; empty if there is none.
 std::vector<GlossaryEntry> explain(const std::string& word);
 
 /// Returns all words that explain() knows by name, for suggestions.

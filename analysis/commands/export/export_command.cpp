@@ -116,6 +116,10 @@ int run_export(ExportOptions options, const CommonOptions& common) {
                  firmware::kSmallerNetwork);
     fmt::print("\n");
   }
+  std::vector<std::string> next = network_words(options.network);
+  next.insert(next.begin(), "match");
+  next.push_back(options.output);
+  print_next(common, next);
   return kDone;
 }
 

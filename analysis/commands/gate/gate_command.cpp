@@ -168,6 +168,12 @@ int run_gate(const GateOptions& options, const CommonOptions& common) {
   const files::Node record = described(result, options);
   write_outputs(result, record, options, common);
   keep_release(*policy, result, record, options, common);
+  if (result.verdict() == gate::Verdict::kPass) {
+    if (options.bundle.empty())
+      print_next(common, {"gate", options.policy, "--bundle", "evidence"});
+    else
+      print_next(common, {"verify-bundle", options.bundle});
+  }
   return exit_code(result, options.allow_inconclusive);
 }
 

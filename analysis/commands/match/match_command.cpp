@@ -143,6 +143,7 @@ int run_match(MatchOptions options, const CommonOptions& common) {
   inputs.insert(inputs.end(), match.files.begin(), match.files.end());
   write_result(common, result_of("match", inputs, std::nullopt, Result{match, is_rounded}));
   if (common.prints_text()) print(match, options.file);
+  if (match.verdict == firmware::ArtefactVerdict::kEqual) print_next(common, {"gate", "policy.toml"});
   return exit_code(match.verdict);
 }
 

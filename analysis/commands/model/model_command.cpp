@@ -80,6 +80,10 @@ int run_model(const ModelOptions& options, const CommonOptions& common) {
   }
   files::write_file(options.output, stability::to_toml(draft.model, comments), common.force);
   write_result(common, result_of("model", inputs, std::nullopt, result));
+  std::vector<std::string> next = {"study", options.output};
+  next.insert(next.end(), options.words.begin() + 1, options.words.end());
+  next.insert(next.end(), {"-o", "study"});
+  print_next(common, next);
   return kDone;
 }
 

@@ -154,7 +154,8 @@ void add_before_and_after(Report& report, const residuals::Comparison& before,
     if (curves.back().points < 2) curves.pop_back();
   }
   std::stable_sort(curves.begin(), curves.end(), [](const VariableCurve& a, const VariableCurve& b) {
-    return a.highest - a.lowest > b.highest - b.lowest;
+    const bool of_a = residuals::is_reaction(a.variable), of_b = residuals::is_reaction(b.variable);
+    return of_a != of_b ? of_b : a.highest - a.lowest > b.highest - b.lowest;
   });
   for (std::size_t k = 0; k < std::min(kMostVariables, curves.size()); ++k)
     add_variable(report, curves[k], room.axis, unit);

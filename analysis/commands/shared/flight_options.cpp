@@ -66,16 +66,12 @@ residuals::Inputs read_flights(const FlightOptions& options, bool own_models, bo
   return inputs;
 }
 
-void declare_unit(CLI::App& app, FlightOptions& options, const std::string& standard) {
-  options.unit = standard;
-  CLI::Option* const unit =
-      app.add_option(
-             "--unit", options.unit,
-             std::string("Unit of forces on the page: N (mN below a weight of 10 N), gf, or m_s2 (over the "
-                         "mass)") +
-                 (standard.empty() ? "; default gf for vehicles below 1 N, else N" : ""))
-          ->check(CLI::IsMember({"N", "gf", "m_s2"}));
-  if (!standard.empty()) unit->capture_default_str();
+void declare_unit(CLI::App& app, FlightOptions& options) {
+  app.add_option(
+         "--unit", options.unit,
+         "Unit of forces in text and pages: N (the default; mN below a weight of 10 N), gf, or m_s2 (over "
+         "the mass)")
+      ->check(CLI::IsMember({"N", "gf", "m_s2"}));
 }
 
 void declare_no_embed(CLI::App& app, FlightOptions& options) {
@@ -83,17 +79,17 @@ void declare_no_embed(CLI::App& app, FlightOptions& options) {
                "Leave the signals of the logs out of the page: no curves over time, nothing in space");
 }
 
-residuals::ForceUnit page_unit(const FlightOptions& options, const residuals::Inputs& inputs) {
+residuals::ForceUnit unit_of(const FlightOptions& options, const residuals::Inputs& inputs) {
   const bool is_acceleration = options.unit == "m_s2";
   if (inputs.rules.per_mass) {
     if (!options.unit.empty() && !is_acceleration)
       throw UsageError("--unit " + options.unit + ": no mass is known, so forces are in m/s^2; name a model");
-    return residuals::force_unit(inputs);
+    return {"m/s^2", 1};
   }
-  if (options.unit.empty()) return residuals::force_unit(inputs);
   if (is_acceleration && inputs.models.size() > 1)
     throw UsageError("--unit m_s2: the kinds of vehicles differ in mass; use N or gf, or a single kind");
-  return residuals::chosen_force_unit(options.unit, inputs.models[0]);
+  const bool is_published = options.unit.empty() && options.published_filter;
+  return residuals::force_unit(is_published ? "gf" : options.unit, inputs.models);
 }
 
 residuals::Inputs read_others(const FlightOptions& options, const std::vector<std::string>& against,
@@ -135,6 +131,7 @@ std::string next_command(const std::string& command, std::vector<std::string> wo
   if (!options.fleet.empty()) words.insert(words.end(), {"--flights", options.fleet});
   if (!options.columns.empty()) words.insert(words.end(), {"--columns", options.columns});
   if (options.keep) words.emplace_back("--keep");
+  if (!options.unit.empty()) words.insert(words.end(), {"--unit", options.unit});
   words.insert(words.end(), more.begin(), more.end());
   return shell_line(words);
 }

@@ -31,16 +31,16 @@ void declare_flights(CLI::App& app, FlightOptions& options, bool positional_mode
 residuals::Inputs read_flights(const FlightOptions& options, bool own_models = false,
                                bool may_lack_model = false, bool fits = false);
 
-/// Declares --unit, the unit of all forces on a page.
-/// @param standard default: "N", "gf", "m_s2", or empty for gf below 1 N of vehicle weight, else N
-void declare_unit(CLI::App& app, FlightOptions& options, const std::string& standard = "N");
+/// Declares --unit, the unit of all forces in text and on a page.
+void declare_unit(CLI::App& app, FlightOptions& options);
 
 /// Declares --no-embed of commands that write a page.
 void declare_no_embed(CLI::App& app, FlightOptions& options);
 
-/// Returns the unit requested by --unit; m/s^2 if no mass is known.
+/// Returns the unit requested by --unit; m/s^2 if no mass is known. The default is N or mN, and with --published-filter
+/// gf, in which the published tables are.
 /// @throws UsageError if the flights do not support the unit: forces without a mass, or one mass for several kinds.
-residuals::ForceUnit page_unit(const FlightOptions& options, const residuals::Inputs& inputs);
+residuals::ForceUnit unit_of(const FlightOptions& options, const residuals::Inputs& inputs);
 
 /// Reads the flights of --against with the same models.
 /// @throws UsageError if a flight is on both sides, since it would be compared with itself.

@@ -12,9 +12,9 @@ namespace swarmcert::analysis {
 
 /// Units of the first kPlottedVariables of residuals::variable_name(), which are scalars; the later variables are
 /// neighbour positions.
-inline constexpr int kPlottedVariables = 6;
-inline constexpr const char* kVariableUnits[kPlottedVariables] = {"[m]", "[m/s]", "[-]",
-                                                                  "[V]", "[s]",   "[degrees]"};
+inline constexpr int kPlottedVariables = 7;
+inline constexpr const char* kVariableUnits[kPlottedVariables] = {"[m]", "[m/s]",     "[-]",  "[V]",
+                                                                  "[s]", "[degrees]", "[m/s]"};
 
 /// Adds a table of the worst moments, to which the figures of add_flown() can jump.
 void add_moments(Report& report, const residuals::Comparison& comparison, const residuals::ForceUnit& unit);

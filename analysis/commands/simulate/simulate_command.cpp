@@ -226,6 +226,10 @@ int run_simulate(SimulateOptions options, const CommonOptions& common) {
     print(result, described);
     fmt::print("Logs: {}\n", (std::filesystem::path(options.output) / log_name(0, options.run)).string());
   }
+  std::vector<std::string> next = options.models;
+  next.insert(next.begin(), "compare");
+  next.push_back(options.output);
+  print_next(common, next);
   return kDone;
 }
 

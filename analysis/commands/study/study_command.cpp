@@ -90,7 +90,7 @@ int run_study(const StudyOptions& options, const CommonOptions& common) {
   std::vector<std::string> notes;
   for (const identification::Mislabelled& label : labels) notes.push_back(sentence(label));
   for (const identification::ClockOffset& clock : clocks) notes.push_back(sentence(clock));
-  const residuals::ForceUnit unit = page_unit(options.flights, inputs);
+  const residuals::ForceUnit unit = unit_of(options.flights, inputs);
   std::vector<std::string> files = inputs.files(), other_files;
   std::optional<residuals::Inputs> others;
   if (!options.against.empty()) {

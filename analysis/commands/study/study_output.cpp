@@ -2,10 +2,12 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <utility>
 
+#include "analysis/commands/diagnose/diagnose_output.h"
 #include "analysis/commands/diagnose/rotor_output.h"
-#include "analysis/identification/verdict.h"
+#include "analysis/commands/shared/character_plot.h"
 #include "analysis/report/report_text.h"
 
 namespace swarmcert::analysis {
@@ -55,12 +57,28 @@ std::string mean_position_error(const Prediction& prediction) {
   return fmt::format("{:.3g} mm", 1000 * mean_m);
 }
 
+std::string left_words(const StudyResult& result) {
+  if (result.left.where != residuals::FailingPlace::Where::kNowhere)
+    return "it still fails " + result.left.words;
+  const std::string variable = adds_forms(result) ? "" : varies_with(result.study.diagnosis);
+  return variable.empty() ? "nothing else stands out"
+                          : "a part of what is left still varies with " + variable;
+}
+
 std::string first_log(const residuals::Inputs& inputs) {
   const std::vector<std::string> logs = residuals::log_files(inputs.found);
   return logs.empty() ? "" : logs[0];
 }
 
 }  // namespace
+
+bool adds_forms(const StudyResult& result) {
+  const auto& named = result.study.diagnosis.ranking;
+  return std::any_of(result.causes.begin(), result.causes.end(), [&](const Cause& cause) {
+    return std::none_of(named.begin(), named.end(),
+                        [&](const identification::Missing& missing) { return missing.effect == cause.name; });
+  });
+}
 
 std::string headline(const StudyResult& result, const residuals::ForceUnit& unit) {
   const Study& study = result.study;
@@ -72,21 +90,19 @@ std::string headline(const StudyResult& result, const residuals::ForceUnit& unit
                        study.ladder.too_poor);
   std::vector<std::string> added;
   for (const Cause& cause : result.causes) added.push_back(cause.name);
-  const std::string left =
-      leaves_something(study.diagnosis) ? "part of the error has no name" : "nothing else stands out";
   const std::string where = where_held_out(study.ladder);
   if (added.empty())
-    return fmt::format("Error of the force (RMS) on {}: {}; no effect lowers it, and {}.", where, before,
-                       left);
+    return fmt::format("Error of the force (RMS) on {}: {}; no effect lowers it.", where, before);
   const double floor_N = study.ladder.rows.back().noise_floor_N;
   return fmt::format("Error of the force (RMS) on {}: {}. After adding {}: {}{}; {}.", where, before,
                      listed(added), error_words(judged(study.after), unit),
-                     floor_N > 0 ? fmt::format(" (noise {:.3g})", floor_N * unit.per_newton()) : "", left);
+                     floor_N > 0 ? fmt::format(" (noise {:.3g})", floor_N * unit.per_newton()) : "",
+                     left_words(result));
 }
 
 std::vector<std::string> conclusions(const StudyResult& result, const residuals::ForceUnit& unit) {
   if (result.study.before.all.overall.statistics.samples == 0) return {};
-  std::vector<std::string> sentences = {"It fails " + result.fails.words + "."};
+  std::vector<std::string> sentences = {residuals::sentence(result.fails)};
   for (const Cause& cause : result.causes) {
     sentences.push_back(sentence(cause, unit) + ".");
     sentences.push_back("  " + cause.equation);
@@ -108,7 +124,7 @@ std::string next_of_study(const Study& study, const FlightOptions& options, cons
     return shell_line({"swarmcert", "inspect", first_log(inputs)});
   if (study.ladder.any_accepted)
     return next_command("compare", {output + "/fitted.toml"}, options, inputs, {"--horizon", "0.5"});
-  if (leaves_something(study.diagnosis))
+  if (residuals::failing_place(study.before.all, {}).where != residuals::FailingPlace::Where::kNowhere)
     return next_command("diagnose", {given}, options, inputs, {"--next"});
   return next_command("compare", {given}, options, inputs, {"--json", "errors.json"});
 }
@@ -118,7 +134,11 @@ void print_study(const StudyResult& result, const residuals::ForceUnit& unit) {
   const std::size_t second = answer.find(". After");
   if (second != std::string::npos) answer[second + 1] = '\n';
   fmt::print("{}\n", answer);
-  for (const std::string& line : conclusions(result, unit)) fmt::print("  {}\n", line);
+  const std::vector<std::string> lines = conclusions(result, unit);
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    fmt::print("  {}\n", lines[i]);
+    if (i == 0) fmt::print("{}", character_plot(result.study.before.all, result.fails, unit));
+  }
   constexpr std::size_t kMostNext = 2;
   for (std::size_t i = 0; i < result.next.size() && i < kMostNext; ++i)
     fmt::print("  fly {}\n", result.next[i]);

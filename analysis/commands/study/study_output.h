@@ -9,6 +9,10 @@
 
 namespace swarmcert::analysis {
 
+/// Whether something was added that the search for named effects in the force does not name: the diagnosis then speaks
+/// of less than the fitted model.
+bool adds_forms(const StudyResult& result);
+
 /// Returns the whole answer in two sentences, with its numbers.
 std::string headline(const StudyResult& result, const residuals::ForceUnit& unit);
 

@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <filesystem>
 
 #include "analysis/cli/command_line.h"
@@ -21,19 +22,19 @@ namespace {
 
 using identification::Study;
 
-void add_findings(Report& report, const Study& study) {
+void add_findings(Report& report, const StudyResult& result) {
   std::vector<std::vector<std::string>> rows;
-  for (const stability::EffectSpec& effect : study.ladder.model.effects) {
-    for (const auto& [parameter, value] : effect.parameters) {
-      const std::string interval = interval_words(effect.name, parameter, effect.fit.interval);
-      rows.push_back({effect.name, parameter,
-                      fmt::format("{:.4g}", shown_beyond_file(effect.name, parameter) + value),
-                      interval.empty() ? "-" : interval});
+  for (const Cause& cause : result.causes) {
+    for (const auto& [parameter, value] : cause.parameters) {
+      const auto& interval = value.interval_90;
+      if (!cause.measure && !(interval && interval->lower < interval->upper)) continue;  // it was held
+      rows.push_back({cause.name, parameter, fmt::format("{:.4g}", value.value),
+                      interval ? fmt::format("{:.4g} .. {:.4g}", interval->lower, interval->upper) : "-"});
     }
   }
   if (!rows.empty()) report.table({"effect", "parameter", "value", "90 % interval"}, rows);
   rows.clear();
-  for (const identification::Missing& missing : study.diagnosis.ranking) {
+  for (const identification::Missing& missing : result.study.diagnosis.ranking) {
     std::string rivals;
     for (const identification::Rival& rival : missing.finding.rivals)
       rivals += (rivals.empty() ? "" : ", ") + rival.effect;
@@ -58,6 +59,12 @@ void add_changes(Report& report, const Changes& changes, const residuals::ForceU
   }
 }
 
+/// Whether the given model has the effect already: it was not missing.
+bool has_effect(const stability::Model& model, const std::string& name) {
+  return std::any_of(model.effects.begin(), model.effects.end(),
+                     [&](const stability::EffectSpec& effect) { return effect.name == name; });
+}
+
 using Notes = std::vector<std::string>;
 
 /// Lines that begin with a space are equations.
@@ -75,18 +82,6 @@ void add_answer(Report& report, const StudyResult& result, const Notes& notes,
   report.literal(result.next_command);
 }
 
-/// What the ladder added beside the effects that the diagnosis names.
-std::string added_later(const StudyResult& result) {
-  std::string names;
-  for (const Cause& cause : result.causes) {
-    bool is_named = false;
-    for (const identification::Missing& missing : result.study.diagnosis.ranking)
-      is_named = is_named || missing.effect == cause.name;
-    if (!is_named) names += (names.empty() ? "" : ", ") + cause.name;
-  }
-  return names;
-}
-
 std::string write_page(const StudyResult& result, const StudyFlights& flights, const Notes& notes,
                        const residuals::ForceUnit& unit, const files::Json& document,
                        const std::string& folder) {
@@ -98,8 +93,11 @@ std::string write_page(const StudyResult& result, const StudyFlights& flights, c
   add_answer(report, result, notes, unit);
   report.heading("What was missing");
   if (result.causes.empty()) report.paragraph("No effect was added.");
-  add_effect_curves(report, study.pictures.effects, unit);
-  add_findings(report, study);
+  std::vector<identification::EffectCurve> added;
+  for (const identification::EffectCurve& curve : study.pictures.effects)
+    if (!has_effect(flights.inputs.models[0], curve.effect)) added.push_back(curve);
+  add_effect_curves(report, added, unit);
+  add_findings(report, result);
   report.heading("How the error fell");
   add_ladder_figure(report, study.ladder.rows, "ladder", unit);
   add_prediction(report, {{"before", result.predicted_before}, {"after", result.predicted_after}});
@@ -107,12 +105,14 @@ std::string write_page(const StudyResult& result, const StudyFlights& flights, c
   add_before_and_after(report, study.before.all, study.after.all, study.pictures.room, unit);
   add_moments(report, study.before.all, unit);
   add_flown(report, flights.flown, study.before.all, unit);
-  report.heading("The remainder, and what to fly next");
-  const std::string later = added_later(result);
-  if (!later.empty())
-    report.paragraph("Of the search for named effects in the force, before this was added: " + later + ".");
-  add_left(report, study.diagnosis, unit);
-  add_remainder(report, study.diagnosis, 1, unit);
+  report.heading("What is left, and what to fly next");
+  if (adds_forms(result)) {
+    report.paragraph("With all that was added: " + residuals::sentence(result.left));
+    add_detectable(report, study.diagnosis);
+  } else {
+    add_left(report, study.diagnosis, unit);
+    add_remainder(report, study.diagnosis, 1, unit);
+  }
   if (result.next.empty())
     report.paragraph("Another flight would not answer any of the questions that are still open.");
   for (const std::string& flight : result.next) report.paragraph("Fly " + flight + ".");

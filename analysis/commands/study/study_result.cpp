@@ -54,6 +54,7 @@ void describe(Record& record, const StudyResult& result) {
   record.object("after", "Errors of the fitted model.",
                 [&](Record& r) { describe_study_errors(r, study.after, result.predicted_after); });
   record.field("fails", result.fails, "Where the given model fails.");
+  record.field("left", result.left, "Where the fitted model fails.");
   record.field("causes", result.causes, "What was added, in order, and what each is worth.");
   record.object("held_out", "What no fit has seen; errors of causes are of these.", [&](Record& r) {
     r.field("how", how_held_out(study.ladder.split.by),
@@ -72,13 +73,15 @@ void describe(Record& record, const StudyResult& result) {
 
 StudyResult study_result(const identification::Study& study, const residuals::ForceUnit& unit,
                          const std::string& next_command) {
+  const residuals::FailingPlace left = residuals::failing_place(study.after.all, unit);
   return {study,
           diagnosed({study.diagnosis}),
           residuals::failing_place(study.before.all, unit),
+          left,
           prediction_of(study.before.predictions),
           prediction_of(study.after.predictions),
           causes_of(study.ladder),
-          next_flights(study.diagnosis),
+          next_flights(study.diagnosis, left.where != residuals::FailingPlace::Where::kNowhere),
           next_command,
           std::nullopt};
 }

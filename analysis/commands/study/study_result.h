@@ -23,7 +23,7 @@ struct Changes {
 struct StudyResult {
   identification::Study study;
   Diagnosed found;
-  residuals::FailingPlace fails;  ///< the given model, on all flights
+  residuals::FailingPlace fails, left;  ///< where the given model fails, and the fitted one, on all flights
   /// Over half a second, by the given and by the fitted model, where nothing was fitted; absent without rates.
   std::optional<Prediction> predicted_before, predicted_after;
   std::vector<Cause> causes;

@@ -266,6 +266,8 @@ int run_train(TrainOptions options, const CommonOptions& common) {
   for (const std::vector<learning::Score>* scores : {&outcome.trained.scores, &outcome.members}) {
     for (const learning::Score& score : *scores) fs::remove(learning::checkpoint_of(options.run, score.seed));
   }
+  print_next(common, {"export", options.output + "/network.toml", "--certificate",
+                      options.output + "/certificate.json", "-o", "firmware"});
   return kDone;
 }
 

@@ -1,7 +1,5 @@
 #include "analysis/identification/balance/balance_ladder.h"
 
-#include <fmt/core.h>
-
 #include <algorithm>
 #include <cmath>
 
@@ -96,10 +94,8 @@ Ladder balance_ladder(residuals::Inputs inputs, const std::string& effect, bool 
   const double before_N = ladder.rows.front().select_rmse_N;
   const bool helps = last.select_rmse_N <= (1 - kLeastFallOfBalance) * before_N && before_N > 0;
   if (!helps)
-    last.note = fmt::format("{} goes from {:.6f} to {:.6f} N",
-                            is_of_torques(effect) ? "the imbalance of the rotors of the select flights"
-                                                  : "the error of the select flights",
-                            before_N, last.select_rmse_N);
+    last.note = too_small_fall(is_of_torques(effect) ? "the imbalance of the rotors" : "the error", before_N,
+                               last.select_rmse_N, kLeastFallOfBalance);
   last.accepted = ladder.any_accepted = helps || keep_anyway;
   for (stability::EffectSpec& spec : specs) {
     spec.fit.select_rmse_before_N = before_N;

@@ -18,14 +18,16 @@ namespace {
 
 constexpr double kPictureBlock_s = 2;
 
-/// Variables over which effects may be drawn: those of the scan that an instant tells, and two more.
+/// Variables over which effects may be drawn: those of the scan that an instant tells, and three more.
 constexpr std::size_t kScanned = static_cast<std::size_t>(kNumScanVariables);
-constexpr std::size_t kThrustRate = kScanned, kBesideUpper = kScanned + 1, kDrawable = kScanned + 2;
+constexpr std::size_t kThrustRate = kScanned, kBesideUpper = kScanned + 1, kFromMiddle = kScanned + 2,
+                      kDrawable = kScanned + 3;
 using Drawable = std::array<float, kDrawable>;
 
 std::pair<std::string, std::string> name_and_unit(std::size_t variable) {
   if (variable == kThrustRate) return {"thrust rate", "N/s"};
   if (variable == kBesideUpper) return {"lateral distance to a vehicle above", "m"};
+  if (variable == kFromMiddle) return {"distance from its middle", "m"};
   const ScanVariableInfo& info = scan_variable(static_cast<ScanVariable>(variable));
   std::string unit = info.unit;
   std::replace(unit.begin(), unit.end(), '_', '/');
@@ -55,6 +57,7 @@ Drawable drawable_of(const residuals::Track& track, std::size_t i) {
   if (now.time_s - then.time_s >= kRate_s)
     all[kThrustRate] = static_cast<float>((now.thrust_N - then.thrust_N) / (now.time_s - then.time_s));
   all[kBesideUpper] = static_cast<float>(beside_upper_m(now));
+  all[kFromMiddle] = std::numeric_limits<float>::quiet_NaN();
   return all;
 }
 
@@ -264,7 +267,8 @@ EffectCurve::Point point_of(const std::vector<std::size_t>& bin, const EffectFor
 
 bool may_vary_with(const std::string& effect, std::size_t variable) {
   const stability::EffectTraits& traits = stability::traits_of(effect);
-  return traits.variables.empty() || traits.varies_with(name_and_unit(variable).first);
+  return traits.variables.empty() || variable == kFromMiddle ||
+         traits.varies_with(name_and_unit(variable).first);
 }
 
 EffectCurve effect_curve(const Records& records, const stability::EffectSpec& effect, std::size_t with,
@@ -308,6 +312,17 @@ EffectCurve effect_curve(const Records& records, const stability::EffectSpec& ef
   return curve;
 }
 
+/// Sets the horizontal distance of every record from the middle of an effect that has one: its x_m and y_m.
+void set_distance(const stability::EffectSpec& effect, Records& records) {
+  const auto x_m = effect.parameters.find("x_m"), y_m = effect.parameters.find("y_m");
+  const bool has_middle = x_m != effect.parameters.end() && y_m != effect.parameters.end();
+  for (std::size_t i = 0; i < records.variables.size(); ++i)
+    records.variables[i][kFromMiddle] =
+        has_middle ? static_cast<float>(std::hypot(static_cast<double>(records.place_m[i].x()) - x_m->second,
+                                                   static_cast<double>(records.place_m[i].y()) - y_m->second))
+                   : std::numeric_limits<float>::quiet_NaN();
+}
+
 }  // namespace
 
 PictureData picture_data(const residuals::Inputs& inputs, const stability::Model& before,
@@ -317,10 +332,11 @@ PictureData picture_data(const residuals::Inputs& inputs, const stability::Model
     models.push_back(after);
     models.back().effects.erase(models.back().effects.begin() + static_cast<std::ptrdiff_t>(k));
   }
-  const Records records = collect(inputs, models);
+  Records records = collect(inputs, models);
   PictureData data;
   data.room = room_map(records, 0, 1);
   for (std::size_t k = 0; k < after.effects.size(); ++k) {
+    set_distance(after.effects[k], records);
     EffectCurve curve = effect_curve(records, after.effects[k], 1, 2 + k);
     if (curve.points.size() >= 3) data.effects.push_back(std::move(curve));
   }
