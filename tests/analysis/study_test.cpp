@@ -293,8 +293,7 @@ TEST_F(Study, EveryCommandOfAWalkEndsWithTheNextOne) {
         "certify " + net + " --method product --nodes 1 -o cert.json", "check cert.json " + net,
         "export " + net + " --certificate cert.json -o firmware", "match " + net + " firmware"}) {
     const Outcome outcome = run_shell("swarmcert " + words + " -q", folder_.path());
-    EXPECT_NE(outcome.output.find("Next: swarmcert "), std::string::npos) << words << "\n"
-                                                                            << outcome.output;
+    EXPECT_NE(outcome.output.find("Next: swarmcert "), std::string::npos) << words << "\n" << outcome.output;
   }
 }
 

@@ -65,7 +65,8 @@ std::string character_plot(const residuals::Comparison& comparison, const residu
   for (const auto& [index, region] : regions) largest = std::max(largest, std::abs(mean(*region)));
   Table table;
   for (const auto& [index, region] : regions)
-    table.rows.push_back({region->name + ":", fmt::format("{:.3g}", mean(*region)), bar(mean(*region) / largest)});
+    table.rows.push_back(
+        {region->name + ":", fmt::format("{:.3g}", mean(*region)), bar(mean(*region) / largest)});
   return head + to_text(table);
 }
 
