@@ -57,7 +57,7 @@ TEST_F(CertifiedChain, AFileWithSeveralOrdersIsRefusedAndTheGivenOrderIsCertifie
 
 TEST_F(CertifiedChain, CheckSaysHowTheFileWasReadAsCertifyDoes) {
   const std::string relu6 = tests::source_path("tests/nn/files/torch_half.pth") + " --activation relu6";
-  const std::string piecewise = "piecewise linear activations of relu6,relu6 are written with ReLU";
+  const std::string piecewise = "piecewise linear activations of relu6 are written with ReLU";
   expect("certify " + relu6 + " --nodes 1 -o cert.json", 0,
          {"\n    stored as float16", "\n    " + piecewise});
   expect("check cert.json " + relu6, 0, {"\n  network: stored as float16", "\n  network: " + piecewise});

@@ -212,11 +212,11 @@ ONLY_FIRST = (  # said by the tool's checker of what it accepts
 
 def said_by_both(first):
     """Returns what the proved checker must print where the tool's one printed `first`, which must state on acceptance
-    that the files were compared. Lines that are indented are on how the files were read."""
+    that the files were compared. Indented lines are on how the files were read, the last one is the next command."""
     assert first.startswith("accepted: ") == (ONLY_FIRST[1] in first), first
     for words in ONLY_FIRST:
         first = first.replace(words, "")
-    return "".join(line for line in first.splitlines(keepends=True) if not line.startswith("  "))
+    return "".join(line for line in first.splitlines(keepends=True) if not line.startswith(("  ", "Next: ")))
 
 
 def is_of_files(reason):

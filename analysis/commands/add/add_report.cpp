@@ -2,6 +2,8 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
+
 #include "analysis/cli/command_line.h"
 #include "analysis/commands/add/add_output.h"
 #include "analysis/commands/shared/effect_output.h"
@@ -13,26 +15,37 @@
 namespace swarmcert::analysis {
 void add_ladder_figure(Report& report, const std::vector<stability::LadderRow>& rows, const std::string& name,
                        const residuals::ForceUnit& force) {
-  const std::string unit = force.name;
-  const double per_newton = force.per_newton();
-  std::string data = "# fit select test step\n";
+  struct Series {
+    double stability::LadderRow::*rmse_N;
+    const char* title;
+    const char* style;
+  };
+  const Series all[] = {{&stability::LadderRow::fit_rmse_N, "flights to fit", "linecolor rgb '#999999'"},
+                        {&stability::LadderRow::select_rmse_N, "flights to select", "linetype 6"},
+                        {&stability::LadderRow::test_rmse_N, "test flights", "linetype 1"}};
+  std::string data = "# step fit select test\n", plots;
   for (const stability::LadderRow& row : rows) {
-    const auto error = [&](double rmse_N) {
-      return rmse_N > 0 ? fmt::format("{:.8g}", per_newton * rmse_N) : "NaN";
-    };
-    if (row.accepted && !row.measure)
+    if (!row.accepted || row.measure) continue;
+    data += plot_field((row.effect == "nominal" ? "" : "+ ") + row.effect);
+    for (const Series& series : all)
       data +=
-          fmt::format("{} {} {} {}\n", error(row.fit_rmse_N), error(row.select_rmse_N),
-                      error(row.test_rmse_N), plot_field((row.effect == "nominal" ? "" : "+ ") + row.effect));
+          row.*series.rmse_N > 0 ? fmt::format(" {:.8g}", force.per_newton() * (row.*series.rmse_N)) : " NaN";
+    data += "\n";
+  }
+  // gnuplot refuses a histogram without a number, as where nothing was held out.
+  for (int k = 0; k < 3; ++k) {
+    const auto has_number = [&](const auto& row) {
+      return row.accepted && !row.measure && row.*all[k].rmse_N > 0;
+    };
+    if (std::any_of(rows.begin(), rows.end(), has_number))
+      plots += fmt::format("{} '{}.dat' using {}:xtic(1) title '{}' {}", plots.empty() ? "plot" : ",", name,
+                           k + 2, all[k].title, all[k].style);
   }
   report.figure(
       name, data,
-      "set style data histograms\nset style fill solid 0.9 noborder\nset boxwidth 0.9\n"
-      "set ylabel 'RMSE of the " +
-          what_rows_measure(rows) + " [" + unit + "]'\nset yrange [0:*]\nset xtics rotate by -30\nplot '" +
-          name +
-          ".dat' using 1:xtic(4) title 'flights to fit' linecolor rgb '#999999', "
-          "'' using 2 title 'flights to select' linetype 6, '' using 3 title 'test flights' linetype 1\n",
+      fmt::format("set style data histograms\nset style fill solid 0.9 noborder\nset boxwidth 0.9\n"
+                  "set ylabel 'RMSE of the {} [{}]'\nset yrange [0:*]\nset xtics rotate by -30\n{}\n",
+                  what_rows_measure(rows), force.name, plots),
       "Error ladder: how the error of the force falls from the nominal model on, effect by effect, on the "
       "fitted, the selecting and the test flights.");
   report.table(ladder_table(rows, force));

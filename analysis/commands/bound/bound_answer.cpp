@@ -150,10 +150,9 @@ void print_answer(const Tracking& input, const BoundAnswer& answer) {
   std::vector<std::string> conditions;
   for (const Assumption& condition : answer.conditions)
     conditions.push_back(fmt::format("{} ({})", condition.name, condition.status));
-  fmt::print("rests on: {}\n", fmt::join(conditions, "; "));
+  fmt::print("rests on: {}; all that is known: --details\n", fmt::join(conditions, "; "));
   if (!answer.limits.empty()) fmt::print("limited by: {}\n", fmt::join(answer.limits, "; "));
   if (!answer.change.empty()) fmt::print("to change it: {}\n", answer.change);
-  fmt::print("gains, bounds and theorem: --details\n");
 }
 
 int exit_code(const BoundAnswer& answer) {
