@@ -64,12 +64,17 @@ std::vector<Class> by_evidence(const residuals::Inputs& inputs) {
   const evidence::Hypotheses all =
       evidence::hypotheses({inputs, kind, flights, covered.records, 1, [](int, int) {}},
                            identification::all_candidates(inputs.models[0], covered));
-  Names names;
-  for (const evidence::Item& item : evidence::EvidenceSearch(all).best().set) {
-    if (all.entries[item.entry].kind == evidence::Kind::kEffect)
-      names.push_back(all.entries[item.entry].name);
+  evidence::EvidenceSearch search(all);
+  const evidence::Weighed best = search.best();
+  std::vector<Class> named;
+  for (std::size_t i = 0; i < best.set.size(); ++i) {
+    const evidence::Entry& entry = all.entries[best.set[i].entry];
+    if (entry.kind != evidence::Kind::kEffect) continue;
+    named.push_back({entry.name});
+    for (const evidence::Option& other : search.instead_of(best, i))
+      named.back().push_back(all.entries[other.item.entry].name);
   }
-  return names;
+  return named;
 }
 
 std::vector<Class> by_diagnose(const residuals::Inputs& inputs) {

@@ -40,8 +40,8 @@ class EvidenceSearch {
 
   /// Returns the best set: forward steps with removals and exchanges; the noise is estimated again after each step.
   Weighed best();
-  /// Returns the effects that flights cannot tell from the item at `index` of best(): those with which, in its place, the
-  /// set loses less than kNamed_bits; best first.
+  /// Returns the effects that flights cannot tell from the item at `index` of best(): those with which, in its place,
+  /// the set loses less than kNamed_bits; best first.
   std::vector<Option> instead_of(const Weighed& best, std::size_t index) const;
 
  private:

@@ -56,8 +56,8 @@ struct Hypotheses {
   std::array<Eigen::MatrixXf, 3> instruments;
 
   Prior prior_of(const Item& item) const;
-  /// Returns ln of the share of the prior probability that falls to an item: half to effects and half to curves, equally
-  /// to their entries, equally to their shapes and scales.
+  /// Returns ln of the share of the prior probability that falls to an item: half to effects and half to curves,
+  /// equally to their entries, equally to their shapes and scales.
   double log_prior(const Item& item) const;
 };
 
