@@ -1,0 +1,162 @@
+#include "analysis/identification/evidence/hypotheses.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <mutex>
+
+#include "analysis/identification/evidence/flight_columns.h"
+#include "analysis/identification/evidence/instruments.h"
+
+namespace swarmcert::evidence {
+namespace {
+
+/// Standard deviation of the force of an effect or curve where it acts, in weights, before any flight.
+constexpr double kUsual = 0.1;
+/// Of a coefficient that is excluded.
+constexpr double kNone = 1e-9;
+
+/// Adds squares and fourth powers of the lengths of the effects' forces, by column.
+struct Energy {
+  explicit Energy(Eigen::Index columns)
+      : squares(Eigen::ArrayXd::Zero(columns)), fourths(Eigen::ArrayXd::Zero(columns)) {}
+
+  void add(const TrackColumns& values, const Stretch& stretch) {
+    Eigen::ArrayXXd square = Eigen::ArrayXXd::Zero(stretch.count, squares.size());
+    for (int axis = 0; axis < 3; ++axis)
+      square += values.along(axis)
+                    .block(stretch.first, 0, stretch.count, squares.size())
+                    .array()
+                    .square()
+                    .cast<double>();
+    squares += square.colwise().sum().transpose();
+    fourths += square.square().colwise().sum().transpose();
+  }
+  /// Root mean square of the force, weighted with its square: its size where it acts.
+  double force_where_it_acts(Eigen::Index column) const {
+    return squares[column] > 0 ? std::sqrt(fourths[column] / squares[column]) : 0;
+  }
+
+  Eigen::ArrayXd squares, fourths;
+};
+
+Entry entry_of(std::size_t index, const identification::Candidate& candidate, std::vector<int> first_column,
+               const Energy& energy, double weight_N) {
+  Entry entry;
+  entry.name = candidate.name;
+  entry.candidate = index;
+  entry.size = candidate.columns();
+  entry.first_column = std::move(first_column);
+  entry.scales = {{0, 0}};
+  entry.mean = entry.sign = Eigen::VectorXd::Zero(entry.size);
+  entry.deviation = Eigen::VectorXd::Constant(entry.size, kUsual);
+  for (int c = 0; c < entry.size; ++c) {
+    const stability::Parameter& parameter = candidate.info.linear[static_cast<std::size_t>(c)];
+    if (parameter.lower >= 0 && parameter.upper > 0) entry.sign[c] = 1;
+    if (parameter.upper <= 0 && parameter.lower < 0) entry.sign[c] = -1;
+    if (candidate.info.remembers) {
+      entry.mean[c] = 1;  // the gain of a lag or delay
+      continue;
+    }
+    double force_N = 0;  // per unit of the coefficient, the largest among the shapes
+    for (const int first : entry.first_column)
+      force_N = std::max(force_N, energy.force_where_it_acts(first + c));
+    const bool is_free = force_N > 0 && !identification::is_held_at_zero(parameter);
+    entry.deviation[c] = is_free ? kUsual * weight_N / force_N : kNone;
+  }
+  return entry;
+}
+
+Entry entry_of(const CurveOver& over, int first_column, double weight_N) {
+  Entry entry;
+  const char axis = "xyz"[over.axis], number = "123"[over.axis];
+  entry.variable = identification::scan_variable(over.variable).name;
+  entry.name = fmt::format("force_{}{} over {}", over.is_in_body ? "b" : "", over.is_in_body ? number : axis,
+                           entry.variable);
+  entry.kind = Kind::kCurve;
+  entry.size = Curve::kSize;
+  entry.first_column = {first_column};
+  for (const double deviation : {0.2 * kUsual, kUsual}) {
+    for (const double smoothness : {1.0, 100.0}) entry.scales.push_back({deviation * weight_N, smoothness});
+  }
+  return entry;
+}
+
+/// Writes the transforms of a track's columns and residual.
+void transform(const TrackColumns& values, const PlacedTrack& placed, Hypotheses& result) {
+  for (std::size_t s = 0; s < placed.stretches.size(); ++s) {
+    const auto put = [&](const Eigen::MatrixXf& series, Eigen::Index column, float* to) {
+      if (!series.col(column).isZero())
+        result.spectral.transform(placed.first_stretch + s, &series(placed.stretches[s].first, column), to);
+    };
+    for (int axis = 0; axis < 3; ++axis) {
+      const Eigen::MatrixXf& series = values.along(axis);
+      const auto a = static_cast<std::size_t>(axis);
+      for (Eigen::Index c = 0; c + 1 < series.cols(); ++c) put(series, c, result.columns[a].col(c).data());
+      put(series, series.cols() - 1, result.residual_N[a].data());
+    }
+  }
+}
+
+}  // namespace
+
+Prior Hypotheses::prior_of(const Item& item) const {
+  const Entry& entry = entries[item.entry];
+  if (entry.kind == Kind::kEffect)
+    return {entry.mean, Eigen::MatrixXd(entry.deviation.cwiseAbs2().cwiseInverse().asDiagonal()), entry.sign};
+  constexpr double kLevel = 0.05;  // precision of a constant, relative to that of bends
+  const auto [deviation, smoothness] = entry.scales[item.scale];
+  const Eigen::MatrixXd precision =
+      (kLevel * Eigen::MatrixXd::Identity(entry.size, entry.size) + smoothness * Curve::roughness()) /
+      (deviation * deviation);
+  return {Eigen::VectorXd::Zero(entry.size), precision, Eigen::VectorXd::Zero(entry.size)};
+}
+
+double Hypotheses::log_prior(const Item& item) const {
+  const Entry& entry = entries[item.entry];
+  const auto alike = std::count_if(entries.begin(), entries.end(),
+                                   [&](const Entry& other) { return other.kind == entry.kind; });
+  return -std::log(2.0 * static_cast<double>(alike)) -
+         std::log(static_cast<double>(entry.first_column.size() * entry.scales.size()));
+}
+
+Hypotheses hypotheses(const identification::Passes& passes,
+                      std::vector<identification::Candidate> candidates) {
+  constexpr double kSensor = 0.003;  // of the weight, per record
+  const double weight_N = passes.inputs.model_of(passes.kind)->weight_N();
+  const Survey surveyed = survey(passes);
+  const identification::Grams grams = identification::columns_of(std::move(candidates));
+  const Spectral spectral(surveyed.stretches);
+  const NoiseModel noise(spectral.bands(), Eigen::Vector3d::Constant(std::pow(kSensor * weight_N, 2)));
+  const Eigen::Index width = grams.columns + static_cast<Eigen::Index>(surveyed.curves.size()) * Curve::kSize;
+  Hypotheses result{grams.candidates, {}, spectral, noise, {}, {}, {}};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    result.columns[axis].setZero(spectral.rows(), width);
+    result.residual_N[axis].setZero(spectral.rows());
+  }
+  Instruments instruments(spectral, width);
+  Energy energy(grams.columns);
+  std::vector<std::size_t> next(passes.flights.size(), 0);  // track of each flight
+  std::mutex mutex;
+  over_modelled_tracks(passes, [&](std::size_t k, const identification::ModelledTrack& modelled) {
+    const PlacedTrack& placed = surveyed.tracks[k][next[k]++];
+    const TrackColumns values(passes, modelled, grams, surveyed.curves, modelled.track.instants);
+    instruments.add(modelled, placed.stretches, placed.first_stretch,
+                    wanted_columns(passes, modelled, grams, surveyed.curves));
+    transform(values, placed, result);
+    const std::lock_guard<std::mutex> lock(mutex);
+    for (const Stretch& stretch : placed.stretches) energy.add(values, stretch);
+  });
+  for (std::size_t k = 0; k < grams.candidates.size(); ++k)
+    result.entries.push_back(entry_of(k, grams.candidates[k], grams.first_column[k], energy, weight_N));
+  int column = grams.columns;
+  for (const CurveOver& over : surveyed.curves) {
+    result.entries.push_back(entry_of(over, column, weight_N));
+    column += Curve::kSize;
+  }
+  result.instruments = instruments.of_axes();
+  return result;
+}
+
+}  // namespace swarmcert::evidence

@@ -1,0 +1,68 @@
+/// @file Explanations of a residual force, with what each predicts in the flights.
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "analysis/identification/candidates.h"
+#include "analysis/identification/evidence/noise_model.h"
+#include "analysis/identification/passes.h"
+
+namespace swarmcert::evidence {
+
+enum class Kind {
+  kEffect,
+  kCurve  ///< a free curve over a variable, along one axis
+};
+
+/// A named effect or a free curve. Both are explanations of the same kind.
+struct Entry {
+  std::string name;  ///< of the effect, or "force_z over z"
+  Kind kind = Kind::kEffect;
+  std::string variable;                       ///< of a curve
+  std::size_t candidate = 0;                  ///< of an effect, index into Hypotheses::candidates
+  int size = 1;                               ///< columns
+  std::vector<int> first_column;              ///< by shape
+  std::vector<std::array<double, 2>> scales;  ///< of a curve: standard deviation in newton and smoothness
+  Eigen::VectorXd mean, deviation, sign;      ///< of the coefficients, except of a curve; see Prior
+};
+
+/// A normal distribution of coefficients.
+struct Prior {
+  Eigen::VectorXd mean;
+  Eigen::MatrixXd precision;
+  Eigen::VectorXd sign;  ///< +1 or -1: only coefficients of this sign; 0: all
+};
+
+/// An explanation with one of its shapes and one of its scales.
+struct Item {
+  std::size_t entry = 0, shape = 0, scale = 0;
+  bool operator==(const Item& other) const {
+    return entry == other.entry && shape == other.shape && scale == other.scale;
+  }
+};
+
+/// Explanations and flights, in the frequency domain.
+struct Hypotheses {
+  std::vector<identification::Candidate> candidates;
+  std::vector<Entry> entries;
+  Spectral spectral;
+  NoiseModel noise;
+  std::array<Eigen::MatrixXf, 3> columns;  ///< by axis of the world, [rows x columns]
+  std::array<Eigen::VectorXf, 3> residual_N;
+
+  /// By axis, [rows x instruments]; empty if a log has no set points.
+  std::array<Eigen::MatrixXf, 3> instruments;
+
+  Prior prior_of(const Item& item) const;
+  /// Returns ln of the share of the prior probability that falls to an item: half to effects and half to curves,
+  /// equally to their entries, equally to their shapes and scales.
+  double log_prior(const Item& item) const;
+};
+
+/// Evaluates `candidates` and curves over every variable of the scan along the flights.
+Hypotheses hypotheses(const identification::Passes& passes,
+                      std::vector<identification::Candidate> candidates);
+
+}  // namespace swarmcert::evidence

@@ -1,0 +1,151 @@
+/// Names by evidence: transforms, noise, and sets of effects in flights in gusts.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numeric>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "analysis/identification/diagnose.h"
+#include "analysis/identification/evidence/evidence_search.h"
+#include "analysis/run.h"
+#include "data.h"
+#include "hidden_effect/truths.h"
+
+namespace swarmcert::tests {
+namespace {
+
+constexpr int kRecords = 4000;
+constexpr double kStep_s = 0.01;
+
+std::vector<float> transformed(const evidence::Spectral& spectral, const std::vector<float>& series) {
+  std::vector<float> to(static_cast<std::size_t>(spectral.rows()));
+  spectral.transform(0, series.data(), to.data());
+  return to;
+}
+
+/// A first-order process with time constant tau_s, observed with white noise, both of standard deviation 1 and `white`.
+std::vector<float> gust(double tau_s, double white, unsigned seed) {
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal;
+  std::vector<float> series;
+  const double keeps = std::exp(-kStep_s / tau_s);
+  double state = normal(random);
+  for (int i = 0; i < kRecords; ++i) {
+    series.push_back(static_cast<float>(state + white * normal(random)));
+    state = keeps * state + std::sqrt(1 - keeps * keeps) * normal(random);
+  }
+  return series;
+}
+
+struct NamedEffect {
+  std::string name;
+  double value, deviation;  ///< of the first coefficient
+};
+
+/// Flies `truth` three times and returns what evidence names.
+std::vector<NamedEffect> named_in(const Truth& truth) {
+  const ScratchFolder folder;
+  for (int run = 0; run < 3; ++run)
+    fly(truth, {Program::kRich, 1, 30, 4100 + static_cast<std::uint64_t>(run)}, folder.path(), run);
+  residuals::InputArguments arguments;
+  arguments.models = {source_path("stability/models/crazyflie-small.toml")};
+  arguments.flights = {folder.path()};
+  const residuals::Inputs inputs = residuals::read_inputs(arguments);
+  const std::string& kind = inputs.models[0].kind;
+  const std::vector<int> flights = identification::every_flight(inputs);
+  const identification::Coverage covered = identification::coverage(inputs, kind, flights, 2);
+  const evidence::Hypotheses all =
+      evidence::hypotheses({inputs, kind, flights, covered.records, 2, [](int, int) {}},
+                           identification::all_candidates(inputs.models[0], covered));
+  const evidence::Weighed best = evidence::EvidenceSearch(all).best();
+  std::vector<NamedEffect> named;
+  Eigen::Index first = 0;
+  for (const evidence::Item& item : best.set) {
+    const evidence::Entry& entry = all.entries[item.entry];
+    named.push_back({entry.name, best.coefficients[first], std::sqrt(best.covariance(first, first))});
+    first += entry.size;
+  }
+  return named;
+}
+
+TEST(Evidence, ProductsOfTransformsAreThoseOfTheSeriesFadedAtBothEnds) {
+  const evidence::Spectral spectral({{0, kRecords, kStep_s}});
+  std::vector<float> wave, other;
+  for (int i = 0; i < kRecords; ++i) {
+    wave.push_back(static_cast<float>(std::sin(2 * M_PI * 0.7 * kStep_s * i)));
+    other.push_back(static_cast<float>(std::sin(2 * M_PI * 0.7 * kStep_s * i + 1)));
+  }
+  double in_time = 0;
+  for (int i = 0; i < kRecords; ++i) {
+    const double from_end_s = kStep_s * (std::min(i, kRecords - 1 - i) + 0.5);
+    const double share = from_end_s < 1 ? 0.5 - 0.5 * std::cos(M_PI * from_end_s) : 1;
+    in_time += share * share * wave[static_cast<std::size_t>(i)] * other[static_cast<std::size_t>(i)];
+  }
+  const std::vector<float> a = transformed(spectral, wave), b = transformed(spectral, other);
+  EXPECT_NEAR(std::inner_product(a.begin(), a.end(), b.begin(), 0.0), in_time, 1e-3 * in_time);
+}
+
+TEST(Evidence, AGustHasTheVarianceOfTheNoiseModelAlongADirectionOfSlowSetPoints) {
+  const evidence::Spectral spectral({{0, kRecords, kStep_s}});
+  const evidence::NoiseModel noise(spectral.bands(), Eigen::Vector3d::Constant(1e-4));
+  // A ramp jumps from the last record to the first; so does most of the gust.
+  std::vector<float> ramp(kRecords);
+  std::iota(ramp.begin(), ramp.end(), 0.0F);
+  const std::vector<float> direction = transformed(spectral, ramp);
+  double sum = 0;
+  constexpr int kRuns = 200;
+  for (unsigned seed = 0; seed < kRuns; ++seed) {
+    const std::vector<float> y = transformed(spectral, gust(0.7, 0.03, seed));
+    const auto bands = static_cast<Eigen::Index>(spectral.bands().size());
+    Eigen::VectorXd squares = Eigen::VectorXd::Zero(3 * bands);
+    for (Eigen::Index b = 0; b < bands; ++b) {
+      const evidence::Band& band = spectral.bands()[static_cast<std::size_t>(b)];
+      for (int row = band.first; row < band.first + band.count; ++row)
+        squares[b] += std::pow(y[static_cast<std::size_t>(row)], 2);
+      squares[bands + b] = squares[2 * bands + b] = squares[b];
+    }
+    const Eigen::VectorXd S = noise.power(squares);
+    double along = 0, length = 0;
+    for (Eigen::Index b = 0; b < bands; ++b) {
+      const evidence::Band& band = spectral.bands()[static_cast<std::size_t>(b)];
+      for (int row = band.first; row < band.first + band.count; ++row) {
+        const auto i = static_cast<std::size_t>(row);
+        along += direction[i] * y[i] / S[b];
+        length += std::pow(direction[i], 2) / S[b];
+      }
+    }
+    sum += along * along / length / kRuns;
+  }
+  // The mean of kRuns squares of standard normal numbers is 1 +- 0.1.
+  EXPECT_NEAR(sum, 1, 0.35);
+}
+
+TEST(Evidence, NamesNothingInAGustAlone) {
+  Truth truth;
+  truth.gust_N = 0.02;
+  truth.gust_time_s = 0.7;
+  for (const NamedEffect& effect : named_in(truth)) ADD_FAILURE() << effect.name << " is not there";
+}
+
+TEST(Evidence, NamesBothEffectsOfAPairInAGustWithTheirValues) {
+  Truth truth;
+  truth.gust_N = 0.02;
+  truth.gust_time_s = 0.7;
+  truth.thrust_factor = 1.08;
+  truth.force_N = [](const Moment& now) { return Eigen::Vector3d(-0.02 * now.v_m_s); };
+  const std::vector<NamedEffect> named = named_in(truth);
+  ASSERT_EQ(named.size(), 2u);
+  for (const NamedEffect& effect : named) {
+    const bool is_drag = effect.name == "drag_linear";
+    EXPECT_TRUE(is_drag || effect.name == "thrust_ratio") << effect.name;
+    const double truth_value = is_drag ? 0.02 : 0.08;
+    EXPECT_LT(std::abs(effect.value - truth_value), 3 * effect.deviation)
+        << effect.name << " " << effect.value;
+    EXPECT_LT(effect.deviation, 0.25 * truth_value) << effect.name;
+  }
+}
+
+}  // namespace
+}  // namespace swarmcert::tests
