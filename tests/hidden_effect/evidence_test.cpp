@@ -16,8 +16,8 @@
 namespace swarmcert::tests {
 namespace {
 
-constexpr int kRecords = 4000;
-constexpr double kStep_s = 0.01;
+constexpr int kManyRecords = 4000;
+constexpr double kRecordStep_s = 0.01;
 
 std::vector<float> transformed(const evidence::Spectral& spectral, const std::vector<float>& series) {
   std::vector<float> to(static_cast<std::size_t>(spectral.rows()));
@@ -30,9 +30,9 @@ std::vector<float> gust(double tau_s, double white, unsigned seed) {
   std::mt19937_64 random(seed);
   std::normal_distribution<double> normal;
   std::vector<float> series;
-  const double keeps = std::exp(-kStep_s / tau_s);
+  const double keeps = std::exp(-kRecordStep_s / tau_s);
   double state = normal(random);
-  for (int i = 0; i < kRecords; ++i) {
+  for (int i = 0; i < kManyRecords; ++i) {
     series.push_back(static_cast<float>(state + white * normal(random)));
     state = keeps * state + std::sqrt(1 - keeps * keeps) * normal(random);
   }
@@ -71,15 +71,15 @@ std::vector<NamedEffect> named_in(const Truth& truth) {
 }
 
 TEST(Evidence, ProductsOfTransformsAreThoseOfTheSeriesFadedAtBothEnds) {
-  const evidence::Spectral spectral({{0, kRecords, kStep_s}});
+  const evidence::Spectral spectral({{0, kManyRecords, kRecordStep_s}});
   std::vector<float> wave, other;
-  for (int i = 0; i < kRecords; ++i) {
-    wave.push_back(static_cast<float>(std::sin(2 * M_PI * 0.7 * kStep_s * i)));
-    other.push_back(static_cast<float>(std::sin(2 * M_PI * 0.7 * kStep_s * i + 1)));
+  for (int i = 0; i < kManyRecords; ++i) {
+    wave.push_back(static_cast<float>(std::sin(2 * M_PI * 0.7 * kRecordStep_s * i)));
+    other.push_back(static_cast<float>(std::sin(2 * M_PI * 0.7 * kRecordStep_s * i + 1)));
   }
   double in_time = 0;
-  for (int i = 0; i < kRecords; ++i) {
-    const double from_end_s = kStep_s * (std::min(i, kRecords - 1 - i) + 0.5);
+  for (int i = 0; i < kManyRecords; ++i) {
+    const double from_end_s = kRecordStep_s * (std::min(i, kManyRecords - 1 - i) + 0.5);
     const double share = from_end_s < 1 ? 0.5 - 0.5 * std::cos(M_PI * from_end_s) : 1;
     in_time += share * share * wave[static_cast<std::size_t>(i)] * other[static_cast<std::size_t>(i)];
   }
@@ -88,10 +88,10 @@ TEST(Evidence, ProductsOfTransformsAreThoseOfTheSeriesFadedAtBothEnds) {
 }
 
 TEST(Evidence, AGustHasTheVarianceOfTheNoiseModelAlongADirectionOfSlowSetPoints) {
-  const evidence::Spectral spectral({{0, kRecords, kStep_s}});
+  const evidence::Spectral spectral({{0, kManyRecords, kRecordStep_s}});
   const evidence::NoiseModel noise(spectral.bands(), Eigen::Vector3d::Constant(1e-4));
   // A ramp jumps from the last record to the first; so does most of the gust.
-  std::vector<float> ramp(kRecords);
+  std::vector<float> ramp(kManyRecords);
   std::iota(ramp.begin(), ramp.end(), 0.0F);
   const std::vector<float> direction = transformed(spectral, ramp);
   double sum = 0;

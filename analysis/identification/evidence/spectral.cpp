@@ -11,8 +11,6 @@ namespace swarmcert::evidence {
 namespace {
 
 constexpr double kLeast_s = 1, kSlow_hz = 0.3, kMost_hz = 25, kPerOctave = 4;
-/// Both ends are faded in and out: a jump from the last to the first record would have power at all frequencies, in one
-/// direction.
 constexpr double kRamp_s = 1;
 constexpr int kSlowBands = 4;
 
@@ -94,7 +92,6 @@ Spectral::Spectral(std::vector<Stretch> stretches) : stretches_(std::move(stretc
     next[key] = rows_;
     rows_ += cell.count;
   }
-  sources_ = static_cast<int>(source_of.size());
   row_of_.resize(stretches_.size());
   visit([&](std::size_t s, const std::pair<int, int>& key, double, bool is_real) {
     int& row = next[key];

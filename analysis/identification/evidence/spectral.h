@@ -1,11 +1,13 @@
 /// @file Discrete Fourier transform of flights, with the coefficients sorted into frequency bands.
 ///
 /// A stretch is a run of records without a gap. Its transform is real and orthonormal, so that products of transforms
-/// are those of the series in time. Noise of a stationary process has independent coefficients, whose variance depends
-/// on the band only (Whittle 1953).
+/// are those of the series in time, faded in and out within 1 s: a jump from the last record to the first would be one
+/// direction in all bands, in which a slow disturbance and slow set points look correlated. Noise of a stationary
+/// process has independent coefficients, whose variance depends on the band only (Whittle 1953).
 #pragma once
 
 #include <Eigen/Core>
+#include <utility>
 #include <vector>
 
 namespace swarmcert::evidence {
@@ -37,7 +39,6 @@ class Spectral {
   explicit Spectral(std::vector<Stretch> stretches);
 
   const std::vector<Band>& bands() const { return bands_; }
-  int sources() const { return sources_; }
   int rows() const { return rows_; }
   /// Writes the part of a transform that belongs to one stretch to its rows of `to` [rows()].
   /// @param series the records of the stretch
@@ -46,7 +47,7 @@ class Spectral {
  private:
   std::vector<Stretch> stretches_;
   std::vector<Band> bands_;
-  int sources_ = 0, rows_ = 0;
+  int rows_ = 0;
   /// Row of the real and of the imaginary part of each kept frequency of each stretch; -1: identically zero.
   std::vector<std::vector<std::pair<int, int>>> row_of_;
 };
