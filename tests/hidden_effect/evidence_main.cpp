@@ -64,7 +64,7 @@ std::vector<Class> by_evidence(const residuals::Inputs& inputs) {
   const evidence::Hypotheses all =
       evidence::hypotheses({inputs, kind, flights, covered.records, 1, [](int, int) {}},
                            identification::all_candidates(inputs.models[0], covered));
-  evidence::EvidenceSearch search(all);
+  const evidence::EvidenceSearch search(all);
   const evidence::Weighed best = search.best();
   std::vector<Class> named;
   for (std::size_t i = 0; i < best.set.size(); ++i) {

@@ -72,50 +72,89 @@ Eigen::MatrixXd orthonormal_basis(Eigen::MatrixXd columns) {
          all.tail(rank).cwiseSqrt().cwiseInverse().asDiagonal();
 }
 
-}  // namespace
-
-Eigen::VectorXd EvidenceSearch::noise_beside(const Weighed& set) const {
-  std::array<Eigen::VectorXf, 3> left = all_.residual_N;
-  Eigen::Index first = 0;
-  for (const Item& item : set.set) {
-    const Entry& entry = all_.entries[item.entry];
-    const Eigen::VectorXf own = set.coefficients.segment(first, entry.size).cast<float>();
-    for (std::size_t axis = 0; axis < 3; ++axis)
-      left[axis] -= all_.columns[axis].middleCols(entry.first_column[item.shape], entry.size) * own;
-    first += entry.size;
-  }
-  const std::vector<Band>& bands = all_.spectral.bands();
-  Eigen::VectorXd squares_N2(static_cast<Eigen::Index>(3 * bands.size()));
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    for (std::size_t b = 0; b < bands.size(); ++b)
-      squares_N2[static_cast<Eigen::Index>(axis * bands.size() + b)] =
-          left[axis].segment(bands[b].first, bands[b].count).cast<double>().squaredNorm();
-  }
-  return all_.noise.power(squares_N2);
+bool is_effect(const Hypotheses& all, const Item& item) {
+  return all.entries[item.entry].kind == Kind::kEffect;
 }
 
-void EvidenceSearch::project(const Weighed& beside) {
-  const std::vector<Band>& bands = all_.spectral.bands();
-  const Eigen::VectorXd S = noise_beside(beside);
-  std::array<Eigen::MatrixXf, 3> columns;
-  std::array<Eigen::VectorXf, 3> data;
+/// Returns the best effect with at least this score, else the best of all.
+/// @param options best first; not empty
+Option preferred(const Hypotheses& all, const std::vector<Option>& options, double least) {
+  for (const Option& option : options) {
+    if (option.score >= least && is_effect(all, option.item)) return option;
+  }
+  return options.front();
+}
+
+/// Expands numbers by band to rows of the transform.
+Eigen::VectorXd by_row(const Spectral& spectral, const Eigen::VectorXd& by_band) {
+  Eigen::VectorXd result(spectral.rows());
+  for (std::size_t b = 0; b < spectral.bands().size(); ++b) {
+    const Band& band = spectral.bands()[b];
+    result.segment(band.first, band.count).setConstant(by_band[static_cast<Eigen::Index>(b)]);
+  }
+  return result;
+}
+
+/// Returns the sums of squares of rows over each band.
+Eigen::VectorXd by_band(const Spectral& spectral, const Eigen::VectorXd& squares) {
+  Eigen::VectorXd result(static_cast<Eigen::Index>(spectral.bands().size()));
+  for (std::size_t b = 0; b < spectral.bands().size(); ++b) {
+    const Band& band = spectral.bands()[b];
+    result[static_cast<Eigen::Index>(b)] = squares.segment(band.first, band.count).sum();
+  }
+  return result;
+}
+
+/// Returns the power of the noise by cell, from the part of the residual that instruments do not span. What they span
+/// depends on the power, so that both are found in turn.
+Eigen::VectorXd noise_beside_instruments(const Hypotheses& all) {
+  constexpr int kRounds = 3;
+  const auto bands = static_cast<Eigen::Index>(all.spectral.bands().size());
+  Eigen::VectorXd power = Eigen::VectorXd::Ones(3 * bands), squares_N2(3 * bands),
+                  counts = all.noise.counts();
+  for (int round = 0; round < kRounds; ++round) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const Eigen::Index first = static_cast<Eigen::Index>(axis) * bands;
+      const Eigen::VectorXd weight =
+          by_row(all.spectral, power.segment(first, bands).cwiseSqrt().cwiseInverse());
+      const Eigen::MatrixXd basis =
+          orthonormal_basis(weight.asDiagonal() * all.instruments[axis].cast<double>());
+      Eigen::VectorXd left = weight.cwiseProduct(all.residual_N[axis].cast<double>());
+      left -= basis * (basis.transpose() * left);
+      squares_N2.segment(first, bands) = by_band(all.spectral, left.cwiseQuotient(weight).cwiseAbs2());
+      counts.segment(first, bands) =
+          all.noise.counts().segment(first, bands) - by_band(all.spectral, basis.rowwise().squaredNorm());
+    }
+    power = all.noise.power(squares_N2, counts);
+  }
+  return power;
+}
+
+}  // namespace
+
+EvidenceSearch::EvidenceSearch(const Hypotheses& all) : all_(all) {
+  const Eigen::VectorXd power = noise_beside_instruments(all);
+  const auto bands = static_cast<Eigen::Index>(all.spectral.bands().size());
+  std::array<Eigen::MatrixXd, 3> parts;
   Eigen::Index numbers = 0;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    Eigen::VectorXd weight(all_.spectral.rows());
-    for (std::size_t b = 0; b < bands.size(); ++b)
-      weight.segment(bands[b].first, bands[b].count)
-          .setConstant(1 / std::sqrt(S[static_cast<Eigen::Index>(axis * bands.size() + b)]));
-    const Eigen::MatrixXd basis =
-        orthonormal_basis(weight.asDiagonal() * all_.instruments[axis].cast<double>());
-    const Eigen::MatrixXf weighted = (weight.asDiagonal() * basis).cast<float>();
-    columns[axis] = weighted.transpose() * all_.columns[axis];
-    data[axis] = weighted.transpose() * all_.residual_N[axis];
-    numbers += data[axis].size();
+    parts[axis] = projected(axis, power.segment(static_cast<Eigen::Index>(axis) * bands, bands));
+    numbers += parts[axis].rows();
   }
-  columns_.resize(numbers, columns[0].cols());
-  data_.resize(numbers);
-  columns_ << columns[0].cast<double>(), columns[1].cast<double>(), columns[2].cast<double>();
-  data_ << data[0].cast<double>(), data[1].cast<double>(), data[2].cast<double>();
+  Eigen::MatrixXd joined(numbers, parts[0].cols());
+  joined << parts[0], parts[1], parts[2];
+  columns_ = joined.leftCols(joined.cols() - 1);
+  data_ = joined.rightCols<1>();
+}
+
+Eigen::MatrixXd EvidenceSearch::projected(std::size_t axis, const Eigen::VectorXd& power) const {
+  const Eigen::VectorXd weight = by_row(all_.spectral, power.cwiseSqrt().cwiseInverse());
+  const Eigen::MatrixXd basis =
+      orthonormal_basis(weight.asDiagonal() * all_.instruments[axis].cast<double>());
+  const Eigen::MatrixXf weighted = (weight.asDiagonal() * basis).cast<float>();
+  Eigen::MatrixXf result(basis.cols(), all_.columns[axis].cols() + 1);
+  result << weighted.transpose() * all_.columns[axis], weighted.transpose() * all_.residual_N[axis];
+  return result.cast<double>();
 }
 
 Weighed EvidenceSearch::weigh(const Set& set) const {
@@ -172,7 +211,9 @@ Weighed EvidenceSearch::changed(const Weighed& now, std::size_t index) const {
   Weighed removed = weigh(rest);
   if (removed.score > now.score) return removed;
   const Option other = options(rest).front();
-  if (other.score > now.score + kExchanged_bits * kNatsPerBit && !(other.item == now.set[index]))
+  const bool loses_name = is_effect(all_, now.set[index]) && !is_effect(all_, other.item);
+  const double needed_bits = loses_name ? kNamed_bits : kExchanged_bits;
+  if (other.score > now.score + needed_bits * kNatsPerBit && !(other.item == now.set[index]))
     return weigh(with(rest, other.item));
   return now;
 }
@@ -180,9 +221,9 @@ Weighed EvidenceSearch::changed(const Weighed& now, std::size_t index) const {
 std::vector<Option> EvidenceSearch::instead_of(const Weighed& best, std::size_t index) const {
   std::vector<Option> result;
   for (const Option& option : options(without(best.set, index))) {
-    const bool is_effect = all_.entries[option.item.entry].kind == Kind::kEffect;
     const bool is_close = option.score > best.score - kNamed_bits * kNatsPerBit;
-    if (is_effect && is_close && option.item.entry != best.set[index].entry) result.push_back(option);
+    if (is_effect(all_, option.item) && is_close && option.item.entry != best.set[index].entry)
+      result.push_back(option);
   }
   return result;
 }
@@ -197,16 +238,23 @@ Weighed EvidenceSearch::improved(Weighed now) const {
   return now;
 }
 
-Weighed EvidenceSearch::best() {
-  Weighed now;
-  for (;;) {
-    project(now);
-    now = improved(weigh(now.set));
-    const std::vector<Option> all = options(now.set);
-    if (now.set.size() == kMostExplanations || all.front().score < now.score + kNamed_bits * kNatsPerBit)
-      return now;
-    now = weigh(with(now.set, all.front().item));
+Weighed EvidenceSearch::best() const {
+  Weighed now = weigh({});
+  bool is_improved = true;
+  while (now.set.size() < kMostExplanations) {
+    const double least = now.score + kNamed_bits * kNatsPerBit;
+    const Option next = preferred(all_, options(now.set), least);
+    const bool adds_effect = next.score >= least && is_effect(all_, next.item);
+    if (!adds_effect && !is_improved) {  // no further effect: the set is complete enough to be judged
+      now = improved(std::move(now));
+      is_improved = true;
+      continue;
+    }
+    if (next.score < least) return now;
+    now = weigh(with(now.set, next.item));
+    is_improved = false;
   }
+  return improved(std::move(now));
 }
 
 }  // namespace swarmcert::evidence

@@ -36,19 +36,21 @@ NoiseModel::NoiseModel(const std::vector<Band>& bands, const Eigen::Vector3d& fl
   }
 }
 
-NoiseModel::Shares NoiseModel::start(const Channel& channel, const Eigen::VectorXd& squares_N2) const {
+NoiseModel::Shares NoiseModel::start(const Channel& channel, const Eigen::VectorXd& squares_N2,
+                                     const Eigen::VectorXd& counts) {
   std::vector<double> mean;
   for (int i = channel.first; i < channel.first + channel.count; ++i)
-    mean.push_back(squares_N2[i] / counts_[i]);
+    mean.push_back(squares_N2[i] / std::max(counts[i], 1.0));
   const auto middle = mean.begin() + static_cast<std::ptrdiff_t>(mean.size() / 2);
   std::nth_element(mean.begin(), middle, mean.end());
   return Shares::Constant(std::log(std::max(*middle, channel.floor_N2) / kShapes));
 }
 
-void NoiseModel::improve(const Channel& channel, const Eigen::VectorXd& squares_N2, Shares& shares) const {
+void NoiseModel::improve(const Channel& channel, const Eigen::VectorXd& squares_N2,
+                         const Eigen::VectorXd& counts, Shares& shares) {
   constexpr double kLongest = 1.5;  // of a step of ln a
   const Shares a = shares.array().exp();
-  const Eigen::ArrayXd n = counts_.segment(channel.first, channel.count);
+  const Eigen::ArrayXd n = counts.segment(channel.first, channel.count);
   const Eigen::ArrayXd S = channel.shapes.transpose() * a;
   const Eigen::VectorXd pull =
       (squares_N2.segment(channel.first, channel.count).array() - n * S) / (2 * S.square());
@@ -61,11 +63,11 @@ void NoiseModel::improve(const Channel& channel, const Eigen::VectorXd& squares_
   shares += information.ldlt().solve(gradient).cwiseMax(-kLongest).cwiseMin(kLongest);
 }
 
-Eigen::VectorXd NoiseModel::power(const Eigen::VectorXd& squares_N2) const {
+Eigen::VectorXd NoiseModel::power(const Eigen::VectorXd& squares_N2, const Eigen::VectorXd& counts) const {
   Eigen::VectorXd S(counts_.size());
   for (const Channel& channel : channels_) {
-    Shares shares = start(channel, squares_N2);
-    for (int step = 0; step < kSteps; ++step) improve(channel, squares_N2, shares);
+    Shares shares = start(channel, squares_N2, counts);
+    for (int step = 0; step < kSteps; ++step) improve(channel, squares_N2, counts, shares);
     const Shares a = shares.array().exp();
     S.segment(channel.first, channel.count) = channel.shapes.transpose() * a;
   }

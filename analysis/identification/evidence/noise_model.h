@@ -21,7 +21,10 @@ class NoiseModel {
 
   /// Returns S of each cell, N^2 per coefficient: the estimate of largest likelihood, with a weak prior of the shares.
   /// @param squares_N2 sum of the squared coefficients of each cell, axis by axis
-  Eigen::VectorXd power(const Eigen::VectorXd& squares_N2) const;
+  /// @param counts     how many independent coefficients this sum has
+  Eigen::VectorXd power(const Eigen::VectorXd& squares_N2, const Eigen::VectorXd& counts) const;
+  /// Returns the number of coefficients of each cell.
+  const Eigen::VectorXd& counts() const { return counts_; }
 
  private:
   struct Channel {
@@ -31,12 +34,14 @@ class NoiseModel {
   };
   using Shares = Eigen::Matrix<double, kShapes, 1>;  ///< ln a
   /// Returns shares that suit the median power, before any fit.
-  Shares start(const Channel& channel, const Eigen::VectorXd& squares_N2) const;
+  static Shares start(const Channel& channel, const Eigen::VectorXd& squares_N2,
+                      const Eigen::VectorXd& counts);
   /// Takes a step of Fisher scoring.
-  void improve(const Channel& channel, const Eigen::VectorXd& squares_N2, Shares& shares) const;
+  static void improve(const Channel& channel, const Eigen::VectorXd& squares_N2,
+                      const Eigen::VectorXd& counts, Shares& shares);
 
   std::vector<Channel> channels_;
-  Eigen::VectorXd counts_;  ///< coefficients of each cell
+  Eigen::VectorXd counts_;
 };
 
 }  // namespace swarmcert::evidence
