@@ -52,6 +52,7 @@ TEST(FlightCommands, CompareShowsNoErrorsWhereNothingWasCompared) {
   EXPECT_NE(outcome.output.find("nothing was compared: cf1_00: offset 0: the file is empty"),
             std::string::npos)
       << outcome.output;
+  EXPECT_EQ(outcome.output.find("Next: "), std::string::npos) << outcome.output;
   EXPECT_EQ(outcome.output.find("RMSE"), std::string::npos) << outcome.output;
 }
 

@@ -262,7 +262,8 @@ int run_compare(const CompareOptions& options, const CommonOptions& common) {
     const std::chrono::duration<double> run = std::chrono::steady_clock::now() - start;
     if (inputs.found.flights.size() > 1)
       fmt::print("Run time: {:.1f} s for {}.\n", run.count(), counted(inputs.found.flights.size(), "flight"));
-    if (inputs.models.size() == 1 && !inputs.rules.per_mass)
+    const bool has_force = result.comparison.overall.statistics.samples > 0;
+    if (has_force && inputs.models.size() == 1 && !inputs.rules.per_mass)
       fmt::print("Next: {}\n",
                  next_command("diagnose", {inputs.models[0].path}, options.flights, inputs, {}));
   }
