@@ -44,13 +44,6 @@ struct RawLog {
   std::vector<std::string> messages;  ///< that ArduPilot wrote while logging, e.g. "ArduCopter V4.5.1"
   std::vector<LeftOut> left_out;
   LogHealth health;
-
-  /// Adds a record to what is left out under this name and reason.
-  void leave_out_record(const std::string& name, const std::string& why) {
-    for (LeftOut& known : left_out)
-      if (known.name == name && known.why == why) return void(++known.records);
-    left_out.push_back({name, why, 1});
-  }
 };
 
 }  // namespace swarmcert::logs

@@ -111,9 +111,9 @@ class DataflashReader {
     walk([this](std::uint8_t id, std::string_view body) { take_definition(id, body); });
     apply_units();
     log_.health = {};
-    log_.left_out.clear();
+    left_out_.clear();
     walk([this](std::uint8_t id, std::string_view body) { take_message(id, body); });
-    log_.health.damaged_blocks += damaged_formats_;
+    finish();
     return std::move(log_);
   }
 
@@ -158,8 +158,8 @@ class DataflashReader {
       log_.health.truncated = true;
       log_.health.skipped_bytes += next - at;
     } else if (is_unknown) {
-      log_.leave_out_record(fmt::format("message id {}", static_cast<std::uint8_t>(bytes_[at + 2])),
-                            "the file lost the definition of its format");
+      ++left_out_[{fmt::format("message id {}", static_cast<std::uint8_t>(bytes_[at + 2])),
+                   "the file lost the definition of its format"}];
     } else {
       ++log_.health.damaged_blocks;
       log_.health.skipped_bytes += next - at;
@@ -259,9 +259,9 @@ class DataflashReader {
     if (format.name == "PARM") return take_parameter(format, body);
     if (format.name == "MSG") return log_.messages.push_back(text_in(format, body, "Message"));
     if (format.fields.empty() || !time_s) {
-      return log_.leave_out_record(format.name, format.fields.empty()
-                                                    ? "the definition of its format contradicts itself"
-                                                    : "it has no field \"TimeUS\" or \"TimeMS\"");
+      ++left_out_[{format.name, format.fields.empty() ? "the definition of its format contradicts itself"
+                                                      : "it has no field \"TimeUS\" or \"TimeMS\""}];
+      return;
     }
     RawTopic& topic = topic_of(id, body);
     topic.time_s.push_back(*time_s);
@@ -317,6 +317,11 @@ class DataflashReader {
     if (!name.empty()) log_.parameters.emplace(name, value);
   }
 
+  void finish() {
+    log_.health.damaged_blocks += damaged_formats_;
+    for (const auto& [what, count] : left_out_) log_.left_out.push_back({what.first, what.second, count});
+  }
+
   const std::string_view bytes_;
   const std::string path_;
   RawLog log_;
@@ -326,6 +331,7 @@ class DataflashReader {
   std::map<char, double> multipliers_;
   std::map<std::pair<std::uint8_t, int>, std::size_t> topics_;  ///< index in log_.topics
   std::map<std::string, std::uint8_t> names_;
+  std::map<std::pair<std::string, std::string>, std::size_t> left_out_;  ///< messages by name and reason
   std::size_t damaged_formats_ = 0;
 };
 

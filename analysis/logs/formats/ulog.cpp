@@ -123,6 +123,7 @@ class UlogReader {
       read_section(begin, end, end == bytes_.size());
       begin = end;
     }
+    for (const auto& [what, records] : left_out_) log_.left_out.push_back({what.first, what.second, records});
     return std::move(log_);
   }
 
@@ -277,18 +278,16 @@ class UlogReader {
   /// Precondition: is_unknown(message).
   void leave_out(const UlogMessage& message) {
     if (message.type != 'D') {
-      log_.leave_out_record(fmt::format("message type {:#04x}", static_cast<unsigned char>(message.type)),
-                            "is not known");
+      ++left_out_[{fmt::format("message type {:#04x}", static_cast<unsigned char>(message.type)),
+                   "is not known"}];
       return;
     }
     const std::uint16_t id = *integer_at<std::uint16_t>(message.body, 0);
     const auto found = subscriptions_.find(id);
     if (found == subscriptions_.end())
-      log_.leave_out_record(fmt::format("message id {}", id),
-                            "the file lost the message that names its topic");
+      ++left_out_[{fmt::format("message id {}", id), "the file lost the message that names its topic"}];
     else
-      log_.leave_out_record(found->second.name,
-                            "its format, or one that it uses, is not defined in the file");
+      ++left_out_[{found->second.name, "its format, or one that it uses, is not defined in the file"}];
   }
 
   void take(const UlogMessage& message) {
@@ -382,7 +381,8 @@ class UlogReader {
   UlogFormats formats_;
   std::map<std::uint16_t, Subscription> subscriptions_;
   std::vector<Topic> topics_;
-  std::map<std::pair<std::string, int>, std::size_t> topics_of_;  ///< index in topics_
+  std::map<std::pair<std::string, int>, std::size_t> topics_of_;         ///< index in topics_
+  std::map<std::pair<std::string, std::string>, std::size_t> left_out_;  ///< records by name and reason
   std::size_t looked_at_bytes_ = 0;
 };
 
