@@ -9,7 +9,6 @@
 namespace swarmcert::identification {
 namespace {
 
-constexpr double kFlagRatio = 3;
 constexpr double kLeastExplained =
     0.02;  ///< of the squared residual explained by the means over a variable's regions
 
@@ -33,7 +32,7 @@ Remainder remainder(const Passes& passes, const std::vector<stability::EffectSpe
     const double ratio = left.low_band_to_floor[axis];
     if (std::isfinite(ratio)) result.ratio = std::max(result.ratio, ratio);
   }
-  result.flag = result.ratio > kFlagRatio;
+  result.flag = result.ratio > residuals::Spectrum::kSlowToFloor;
   result.line = left.line;
   result.floor_N2 = left.noise_floor_N.squaredNorm();
   result.excess_N2 = std::max(left.rmse_N * left.rmse_N - result.floor_N2, 0.0);

@@ -49,7 +49,7 @@ int failing_axis(const ErrorStatistics& s) {
 }
 
 FailingPlace failing_place(const Comparison& comparison, const ForceUnit& unit) {
-  constexpr double kNoise = 1.5, kSlow = 3, kMostIsMean = 0.5, kLeastOfRegion = 0.1;
+  constexpr double kNoise = 1.5, kMostIsMean = 0.5, kLeastOfRegion = 0.1;
   const ErrorStatistics& s = comparison.overall.statistics;
   const double square = squared(s.rmse.total), noise = comparison.overall.noise_floor_N.squaredNorm();
   FailingPlace place;
@@ -57,7 +57,7 @@ FailingPlace failing_place(const Comparison& comparison, const ForceUnit& unit) 
     place.words = "no record is judged";
     return place;
   }
-  const bool is_slow = (comparison.overall.low_band_to_floor.array() > kSlow).any();
+  const bool is_slow = (comparison.overall.low_band_to_floor.array() > Spectrum::kSlowToFloor).any();
   if (!(square > 0) || (noise > 0 && square <= kNoise * noise && !is_slow)) {
     place.words =
         fmt::format("nowhere above the noise, {:.3g} {}", std::sqrt(noise) * unit.per_newton(), unit.name);

@@ -66,6 +66,8 @@ class Spectrum {
   /// Returns the mean power in 0.3 .. 4 Hz divided by the median power in 12 .. 25 Hz, of which slower logs have only
   /// a lower part: about 1 if only white noise is left. NaN if no piece was long enough.
   Eigen::Vector3d low_band_to_floor() const;
+  /// Above this ratio, slow disturbances are left.
+  static constexpr double kSlowToFloor = 3;
   /// Returns the root of the power of the white noise floor over all frequencies, N rms: what no model can explain.
   Eigen::Vector3d noise_floor_N() const;
   /// Returns the frequency above the low band, 4 Hz, whose five neighbouring frequencies of the spectrum hold the

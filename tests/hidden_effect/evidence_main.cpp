@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "analysis/identification/diagnose.h"
-#include "analysis/identification/evidence/evidence_search.h"
+#include "analysis/identification/evidence/names.h"
 #include "data.h"
 #include "hidden_effect/truths.h"
 
@@ -58,21 +58,11 @@ struct Tally {
 };
 
 std::vector<Class> by_evidence(const residuals::Inputs& inputs) {
-  const std::string& kind = inputs.models[0].kind;
-  const std::vector<int> flights = identification::every_flight(inputs);
-  const identification::Coverage covered = identification::coverage(inputs, kind, flights, 1);
-  const evidence::Hypotheses all =
-      evidence::hypotheses({inputs, kind, flights, covered.records, 1, [](int, int) {}},
-                           identification::all_candidates(inputs.models[0], covered));
-  const evidence::EvidenceSearch search(all);
-  const evidence::Weighed best = search.best();
   std::vector<Class> named;
-  for (std::size_t i = 0; i < best.set.size(); ++i) {
-    const evidence::Entry& entry = all.entries[best.set[i].entry];
-    if (entry.kind != evidence::Kind::kEffect) continue;
-    named.push_back({entry.name});
-    for (const evidence::Option& other : search.instead_of(best, i))
-      named.back().push_back(all.entries[other.item.entry].name);
+  for (const evidence::Named& next : evidence::names_by_evidence(inputs, inputs.models[0].kind, 1)) {
+    if (!next.is_effect) continue;
+    named.push_back({next.name});
+    named.back().insert(named.back().end(), next.others.begin(), next.others.end());
   }
   return named;
 }

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "analysis/identification/diagnose.h"
-#include "analysis/identification/evidence/evidence_search.h"
+#include "analysis/identification/evidence/names.h"
+#include "analysis/identification/evidence/noise_model.h"
 #include "analysis/run.h"
 #include "data.h"
 #include "hidden_effect/truths.h"
@@ -40,14 +40,8 @@ std::vector<float> gust(double tau_s, double white, unsigned seed) {
   return series;
 }
 
-struct NamedEffect {
-  std::string name;
-  std::vector<std::string> others;  ///< that flights cannot tell from it
-  double value, deviation;          ///< of the first coefficient
-};
-
 /// Flies `truth` three times and returns what evidence names.
-std::vector<NamedEffect> named_in(const Truth& truth) {
+std::vector<evidence::Named> named_in(const Truth& truth) {
   const ScratchFolder folder;
   for (int run = 0; run < 3; ++run)
     fly(truth, {Program::kRich, 1, 30, 4100 + static_cast<std::uint64_t>(run)}, folder.path(), run);
@@ -55,24 +49,7 @@ std::vector<NamedEffect> named_in(const Truth& truth) {
   arguments.models = {source_path("stability/models/crazyflie-small.toml")};
   arguments.flights = {folder.path()};
   const residuals::Inputs inputs = residuals::read_inputs(arguments);
-  const std::string& kind = inputs.models[0].kind;
-  const std::vector<int> flights = identification::every_flight(inputs);
-  const identification::Coverage covered = identification::coverage(inputs, kind, flights, 2);
-  const evidence::Hypotheses all =
-      evidence::hypotheses({inputs, kind, flights, covered.records, 2, [](int, int) {}},
-                           identification::all_candidates(inputs.models[0], covered));
-  const evidence::EvidenceSearch search(all);
-  const evidence::Weighed best = search.best();
-  std::vector<NamedEffect> named;
-  Eigen::Index first = 0;
-  for (std::size_t i = 0; i < best.set.size(); ++i) {
-    const evidence::Entry& entry = all.entries[best.set[i].entry];
-    named.push_back({entry.name, {}, best.coefficients[first], std::sqrt(best.covariance(first, first))});
-    for (const evidence::Option& other : search.instead_of(best, i))
-      named.back().others.push_back(all.entries[other.item.entry].name);
-    first += entry.size;
-  }
-  return named;
+  return evidence::names_by_evidence(inputs, inputs.models[0].kind, 2);
 }
 
 TEST(Evidence, ProductsOfTransformsAreThoseOfTheSeriesFadedAtBothEnds) {
@@ -131,7 +108,7 @@ TEST(Evidence, NamesNothingInAGustAlone) {
   Truth truth;
   truth.gust_N = 0.02;
   truth.gust_time_s = 0.7;
-  for (const NamedEffect& effect : named_in(truth)) ADD_FAILURE() << effect.name << " is not there";
+  for (const evidence::Named& effect : named_in(truth)) ADD_FAILURE() << effect.name << " is not there";
 }
 
 TEST(Evidence, NamesADragInAGustWithItsValueAndAThrustScaleBesideItAmongWhatFlightsCannotTellApart) {
@@ -140,11 +117,11 @@ TEST(Evidence, NamesADragInAGustWithItsValueAndAThrustScaleBesideItAmongWhatFlig
   truth.gust_time_s = 0.7;
   truth.thrust_factor = 1.08;
   truth.force_N = [](const Moment& now) { return Eigen::Vector3d(-0.02 * now.v_m_s); };
-  const std::vector<NamedEffect> named = named_in(truth);
+  const std::vector<evidence::Named> named = named_in(truth);
   std::string all;
-  for (const NamedEffect& effect : named) all += effect.name + " ";
+  for (const evidence::Named& effect : named) all += effect.name + " ";
   ASSERT_EQ(named.size(), 2u) << all;
-  for (const NamedEffect& effect : named) {
+  for (const evidence::Named& effect : named) {
     if (effect.name == "drag_linear") {
       EXPECT_LT(std::abs(effect.value - 0.02), 3 * effect.deviation) << effect.value;
       EXPECT_LT(effect.deviation, 0.005);

@@ -125,7 +125,7 @@ def judge(attack, result, where):
 
 
 def mutate(original, generator, count, folder, net):
-    """Both checkers decide alike on so many mutations."""
+    """Asserts that both checkers give the same verdict on `count` mutations."""
     paths, text = [], original.read_text()
     while len(paths) < count:
         changed = json.loads(text)

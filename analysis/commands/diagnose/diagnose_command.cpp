@@ -90,6 +90,14 @@ void print(const Answers& answers, const residuals::ForceUnit& unit) {
   for (const identification::Each& each : answers.each) print_each(each);
 }
 
+/// Returns where the model fails, from a pass over the flights of its own.
+residuals::FailingPlace where_it_fails(const residuals::Inputs& inputs, const CommonOptions& common,
+                                       const residuals::ForceUnit& unit) {
+  Progress progress(common.quiet);
+  const auto show = [&](int done, int total) { progress.show(done, total, "flights compared"); };
+  return residuals::failing_place(residuals::compare(inputs, common.jobs, show), unit);
+}
+
 int run_diagnose(const DiagnoseOptions& options, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
   refuse_folder(common, options.report);
@@ -110,8 +118,7 @@ int run_diagnose(const DiagnoseOptions& options, const CommonOptions& common) {
   Answers answers = answer(options, common, inputs, others ? &*others : nullptr);
   const bool prints = common.prints_text();
   DiagnoseResult result;
-  if (!others)
-    result.fails = residuals::failing_place(residuals::compare(inputs, common.jobs, [](int, int) {}), unit);
+  if (!others) result.fails = where_it_fails(inputs, common, unit);
   if (prints && result.fails) fmt::print("{}\n", sentence(*result.fails));
   if (prints) print(answers, unit);
   result.found = diagnosed(answers.diagnoses);

@@ -50,7 +50,7 @@ constexpr Term kTerms[] = {
     {"vibration",
      "Force at one frequency above 4 Hz, as of a bent propeller or a loose part. It is named with its "
      "frequency; no "
-     "effect describes it: mend the vehicle, or log faster."},
+     "effect describes it: repair the vehicle, or log at a higher rate."},
     {"saturation",
      "Rotors at their largest force: what is asked beyond is not given. The effect thrust_saturation "
      "describes it, and "

@@ -28,8 +28,8 @@ struct Explanation {
 };
 void describe(files::Record& record, const Explanation& explanation);
 
-/// Returns every entry about `word`: what texts call so, the effect of that name or class, fields of that name, and
-/// fields whose description mentions it as a value; empty if there is none.
+/// Returns every entry about `word`: a term of the texts, the effect of that name or class, fields of that name, and
+/// fields whose description mentions it as a value. Empty if no entry matches.
 std::vector<GlossaryEntry> explain(const std::string& word);
 
 /// Returns all words that explain() knows by name, for suggestions.

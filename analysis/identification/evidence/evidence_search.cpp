@@ -10,7 +10,7 @@
 namespace swarmcert::evidence {
 namespace {
 
-constexpr double kNatsPerBit = 0.6931471805599453;
+const double kNatsPerBit = std::log(2.0);
 constexpr std::size_t kMostExplanations = 8;
 
 double log_determinant(const Eigen::MatrixXd& positive) {

@@ -55,7 +55,7 @@ class EvidenceSearch {
   std::vector<Option> options(const Set& set) const;
   /// Removes and exchanges items while the score rises.
   Weighed improved(Weighed now) const;
-  /// Returns a better set without or with another item at `index`; `now` if there is none.
+  /// Removes or replaces the item at `index` if that raises the score, and returns the result.
   Weighed changed(const Weighed& now, std::size_t index) const;
 
   const Hypotheses& all_;

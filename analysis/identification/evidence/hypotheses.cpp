@@ -41,11 +41,10 @@ struct Energy {
   Eigen::ArrayXd squares, fourths;
 };
 
-Entry entry_of(std::size_t index, const identification::Candidate& candidate, std::vector<int> first_column,
+Entry entry_of(const identification::Candidate& candidate, std::vector<int> first_column,
                const Energy& energy, double weight_N) {
   Entry entry;
   entry.name = candidate.name;
-  entry.candidate = index;
   entry.size = candidate.columns();
   entry.first_column = std::move(first_column);
   entry.scales = {{0, 0}};
@@ -71,9 +70,8 @@ Entry entry_of(std::size_t index, const identification::Candidate& candidate, st
 Entry entry_of(const CurveOver& over, int first_column, double weight_N) {
   Entry entry;
   const char axis = "xyz"[over.axis], number = "123"[over.axis];
-  entry.variable = identification::scan_variable(over.variable).name;
   entry.name = fmt::format("force_{}{} over {}", over.is_in_body ? "b" : "", over.is_in_body ? number : axis,
-                           entry.variable);
+                           identification::scan_variable(over.variable).name);
   entry.kind = Kind::kCurve;
   entry.size = Curve::kSize;
   entry.first_column = {first_column};
@@ -130,7 +128,7 @@ Hypotheses hypotheses(const identification::Passes& passes,
   const Spectral spectral(surveyed.stretches);
   const NoiseModel noise(spectral.bands(), Eigen::Vector3d::Constant(std::pow(kSensor * weight_N, 2)));
   const Eigen::Index width = grams.columns + static_cast<Eigen::Index>(surveyed.curves.size()) * Curve::kSize;
-  Hypotheses result{grams.candidates, {}, spectral, noise, {}, {}, {}};
+  Hypotheses result{{}, spectral, noise, {}, {}, {}};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     result.columns[axis].setZero(spectral.rows(), width);
     result.residual_N[axis].setZero(spectral.rows());
@@ -149,7 +147,7 @@ Hypotheses hypotheses(const identification::Passes& passes,
     for (const Stretch& stretch : placed.stretches) energy.add(values, stretch);
   });
   for (std::size_t k = 0; k < grams.candidates.size(); ++k)
-    result.entries.push_back(entry_of(k, grams.candidates[k], grams.first_column[k], energy, weight_N));
+    result.entries.push_back(entry_of(grams.candidates[k], grams.first_column[k], energy, weight_N));
   int column = grams.columns;
   for (const CurveOver& over : surveyed.curves) {
     result.entries.push_back(entry_of(over, column, weight_N));

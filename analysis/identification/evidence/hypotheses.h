@@ -20,8 +20,6 @@ enum class Kind {
 struct Entry {
   std::string name;  ///< of the effect, or "force_z over z"
   Kind kind = Kind::kEffect;
-  std::string variable;                       ///< of a curve
-  std::size_t candidate = 0;                  ///< of an effect, index into Hypotheses::candidates
   int size = 1;                               ///< columns
   std::vector<int> first_column;              ///< by shape
   std::vector<std::array<double, 2>> scales;  ///< of a curve: standard deviation in newton and smoothness
@@ -45,7 +43,6 @@ struct Item {
 
 /// Explanations and flights, in the frequency domain.
 struct Hypotheses {
-  std::vector<identification::Candidate> candidates;
   std::vector<Entry> entries;
   Spectral spectral;
   NoiseModel noise;

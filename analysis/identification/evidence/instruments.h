@@ -6,7 +6,6 @@
 
 #include <Eigen/Core>
 #include <array>
-#include <functional>
 #include <mutex>
 #include <vector>
 
