@@ -18,7 +18,13 @@ class ConstantForce : public Effect {
               {"force_y_N", "world y", 0, -1, 1, {}, Unit::kWeight},
               {"force_z_N", "world z", 0, -1, 1, {}, Unit::kWeight}},
              {}},
-            {Family::kPush}) {}
+            traits()) {}
+  static EffectTraits traits() {
+    EffectTraits traits;
+    traits.family = Family::kPush;
+    traits.may_turn_with_body = true;  // a tilted thrust axis, a biased accelerometer
+    return traits;
+  }
   void columns(const Instant&, const double*, Wrench* columns) const override {
     for (int axis = 0; axis < 3; ++axis)
       columns[axis] = {Eigen::Vector3d::Unit(axis), Eigen::Vector3d::Zero()};

@@ -1,21 +1,14 @@
 #include "analysis/identification/evidence/evidence_search.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace swarmcert::evidence {
 namespace {
 
 const double kNatsPerBit = std::log(2.0);
 constexpr std::size_t kMostExplanations = 8;
-
-double log_determinant(const Eigen::MatrixXd& positive) {
-  return 2 * Eigen::LLT<Eigen::MatrixXd>(positive).matrixLLT().diagonal().array().abs().log().sum();
-}
 
 /// ln of the normal distribution function.
 double log_normal_cdf(double z) {
@@ -34,42 +27,17 @@ Set with(Set set, const Item& item) {
   return set;
 }
 
-bool has_entry(const Set& set, std::size_t entry) {
-  return std::any_of(set.begin(), set.end(), [&](const Item& item) { return item.entry == entry; });
+/// Returns whether a set has the entry, or another of the same name.
+bool has_entry(const Hypotheses& all, const Set& set, std::size_t entry) {
+  return std::any_of(set.begin(), set.end(), [&](const Item& item) {
+    return all.entries[item.entry].name == all.entries[entry].name;
+  });
 }
 
 int size_of(const Hypotheses& all, const Set& set) {
   int size = 0;
   for (const Item& item : set) size += all.entries[item.entry].size;
   return size;
-}
-
-/// Joins the priors of the items of a set.
-Prior joined(const Hypotheses& all, const Set& set) {
-  const int size = size_of(all, set);
-  Prior prior{Eigen::VectorXd::Zero(size), Eigen::MatrixXd::Zero(size, size), Eigen::VectorXd::Zero(size)};
-  Eigen::Index first = 0;
-  for (const Item& item : set) {
-    const Prior part = all.prior_of(item);
-    const Eigen::Index n = part.mean.size();
-    prior.mean.segment(first, n) = part.mean;
-    prior.sign.segment(first, n) = part.sign;
-    prior.precision.block(first, first, n, n) = part.precision;
-    first += n;
-  }
-  return prior;
-}
-
-/// Returns an orthonormal basis of the columns, without directions that hardly any column has.
-Eigen::MatrixXd orthonormal_basis(Eigen::MatrixXd columns) {
-  constexpr double kLeast = 1e-5;  // of the largest eigenvalue, of columns of equal length
-  for (Eigen::Index c = 0; c < columns.cols(); ++c)
-    columns.col(c) /= std::max(columns.col(c).norm(), std::numeric_limits<double>::min());
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> parts(columns.transpose() * columns);
-  const Eigen::VectorXd& all = parts.eigenvalues();
-  const Eigen::Index rank = (all.array() > kLeast * all.maxCoeff()).count();
-  return columns * parts.eigenvectors().rightCols(rank) *
-         all.tail(rank).cwiseSqrt().cwiseInverse().asDiagonal();
 }
 
 bool is_effect(const Hypotheses& all, const Item& item) {
@@ -85,96 +53,78 @@ Option preferred(const Hypotheses& all, const std::vector<Option>& options, doub
   return options.front();
 }
 
-/// Expands numbers by band to rows of the transform.
-Eigen::VectorXd by_row(const Spectral& spectral, const Eigen::VectorXd& by_band) {
-  Eigen::VectorXd result(spectral.rows());
-  for (std::size_t b = 0; b < spectral.bands().size(); ++b) {
-    const Band& band = spectral.bands()[b];
-    result.segment(band.first, band.count).setConstant(by_band[static_cast<Eigen::Index>(b)]);
-  }
-  return result;
-}
-
-/// Returns the sums of squares of rows over each band.
-Eigen::VectorXd by_band(const Spectral& spectral, const Eigen::VectorXd& squares) {
-  Eigen::VectorXd result(static_cast<Eigen::Index>(spectral.bands().size()));
-  for (std::size_t b = 0; b < spectral.bands().size(); ++b) {
-    const Band& band = spectral.bands()[b];
-    result[static_cast<Eigen::Index>(b)] = squares.segment(band.first, band.count).sum();
-  }
-  return result;
-}
-
-/// Returns the power of the noise by cell, from the part of the residual that instruments do not span. What they span
-/// depends on the power, so that both are found in turn.
-Eigen::VectorXd noise_beside_instruments(const Hypotheses& all) {
-  constexpr int kRounds = 3;
-  const auto bands = static_cast<Eigen::Index>(all.spectral.bands().size());
-  Eigen::VectorXd power = Eigen::VectorXd::Ones(3 * bands), squares_N2(3 * bands),
-                  counts = all.noise.counts();
-  for (int round = 0; round < kRounds; ++round) {
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const Eigen::Index first = static_cast<Eigen::Index>(axis) * bands;
-      const Eigen::VectorXd weight =
-          by_row(all.spectral, power.segment(first, bands).cwiseSqrt().cwiseInverse());
-      const Eigen::MatrixXd basis =
-          orthonormal_basis(weight.asDiagonal() * all.instruments[axis].cast<double>());
-      Eigen::VectorXd left = weight.cwiseProduct(all.residual_N[axis].cast<double>());
-      left -= basis * (basis.transpose() * left);
-      squares_N2.segment(first, bands) = by_band(all.spectral, left.cwiseQuotient(weight).cwiseAbs2());
-      counts.segment(first, bands) =
-          all.noise.counts().segment(first, bands) - by_band(all.spectral, basis.rowwise().squaredNorm());
-    }
-    power = all.noise.power(squares_N2, counts);
-  }
-  return power;
-}
-
 }  // namespace
 
-EvidenceSearch::EvidenceSearch(const Hypotheses& all) : all_(all) {
-  const Eigen::VectorXd power = noise_beside_instruments(all);
-  const auto bands = static_cast<Eigen::Index>(all.spectral.bands().size());
-  std::array<Eigen::MatrixXd, 3> parts;
-  Eigen::Index numbers = 0;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    parts[axis] = projected(axis, power.segment(static_cast<Eigen::Index>(axis) * bands, bands));
-    numbers += parts[axis].rows();
+std::vector<int> EvidenceSearch::columns_of(const Set& set) const {
+  std::vector<int> columns;
+  for (const Item& item : set) {
+    const Entry& entry = all_.entries[item.entry];
+    for (int c = 0; c < entry.size; ++c) columns.push_back(entry.first_column[item.shape] + c);
   }
-  Eigen::MatrixXd joined(numbers, parts[0].cols());
-  joined << parts[0], parts[1], parts[2];
-  columns_ = joined.leftCols(joined.cols() - 1);
-  data_ = joined.rightCols<1>();
+  return columns;
 }
 
-Eigen::MatrixXd EvidenceSearch::projected(std::size_t axis, const Eigen::VectorXd& power) const {
-  const Eigen::VectorXd weight = by_row(all_.spectral, power.cwiseSqrt().cwiseInverse());
-  const Eigen::MatrixXd basis =
-      orthonormal_basis(weight.asDiagonal() * all_.instruments[axis].cast<double>());
-  const Eigen::MatrixXf weighted = (weight.asDiagonal() * basis).cast<float>();
-  Eigen::MatrixXf result(basis.cols(), all_.columns[axis].cols() + 1);
-  result << weighted.transpose() * all_.columns[axis], weighted.transpose() * all_.residual_N[axis];
-  return result.cast<double>();
+Prior EvidenceSearch::prior_of(const Set& set) const {
+  const int size = size_of(all_, set);
+  Prior prior{Eigen::VectorXd::Zero(size), Eigen::MatrixXd::Zero(size, size), Eigen::VectorXd::Zero(size)};
+  Eigen::Index first = 0;
+  for (const Item& item : set) {
+    const Prior part = all_.prior_of(item);
+    const Eigen::Index n = part.mean.size();
+    prior.mean.segment(first, n) = part.mean;
+    prior.sign.segment(first, n) = part.sign;
+    prior.precision.block(first, first, n, n) = part.precision;
+    first += n;
+  }
+  return prior;
+}
+
+Eigen::VectorXd EvidenceSearch::left_by(const Weighed& found) const {
+  const std::vector<int> columns = columns_of(found.set);
+  Eigen::VectorXd left = data_.data().cast<double>();
+  for (std::size_t c = 0; c < columns.size(); ++c)
+    left -= found.coefficients[static_cast<Eigen::Index>(c)] * data_.columns().col(columns[c]).cast<double>();
+  return left;
+}
+
+Normal EvidenceSearch::normal_of(const Set& set) const {
+  const int size = size_of(all_, set);
+  Normal normal{Eigen::MatrixXd(size, size), Eigen::VectorXd(size)};
+  int row = 0;
+  for (std::size_t i = 0; i < set.size(); ++i) {
+    const Entry& one = all_.entries[set[i].entry];
+    const int first = one.first_column[set[i].shape];
+    normal.b.segment(row, one.size) = data_.with_data().segment(first, one.size);
+    normal.gram.block(row, row, one.size, one.size) = data_.within(first, one.size);
+    int column = row + one.size;
+    for (std::size_t k = i + 1; k < set.size(); ++k) {
+      const Entry& other = all_.entries[set[k].entry];
+      const auto products =
+          data_.with_all(first, one.size).middleRows(other.first_column[set[k].shape], other.size);
+      normal.gram.block(column, row, other.size, one.size) = products;
+      normal.gram.block(row, column, one.size, other.size) = products.transpose();
+      column += other.size;
+    }
+    row += one.size;
+  }
+  return normal;
 }
 
 Weighed EvidenceSearch::weigh(const Set& set) const {
-  Weighed result{set, -data_.squaredNorm() / 2, {}, {}};
+  Weighed result{set, -data_.data_square() / 2, {}, {}};
   if (set.empty()) return result;
-  const Prior prior = joined(all_, set);
-  Eigen::MatrixXd x(columns_.rows(), prior.mean.size());
-  Eigen::Index first = 0;
-  for (const Item& item : set) {
-    const Entry& entry = all_.entries[item.entry];
-    x.middleCols(first, entry.size) = columns_.middleCols(entry.first_column[item.shape], entry.size);
-    first += entry.size;
-  }
-  const Eigen::MatrixXd hessian = x.transpose() * x + prior.precision;
-  result.covariance = hessian.inverse();
-  result.coefficients = result.covariance * (x.transpose() * data_ + prior.precision * prior.mean);
-  const Eigen::VectorXd off = result.coefficients - prior.mean;
-  result.score = -((data_ - x * result.coefficients).squaredNorm() + off.dot(prior.precision * off)) / 2 +
-                 (log_determinant(prior.precision) - log_determinant(hessian)) / 2;
-  for (Eigen::Index i = 0; i < off.size(); ++i) {
+  const Prior prior = prior_of(set);
+  const Normal normal = normal_of(set);
+  const Eigen::VectorXd pull = normal.b + prior.precision * prior.mean;
+  const Eigen::LLT<Eigen::MatrixXd> hessian(normal.gram + prior.precision), precision(prior.precision);
+  const auto half_log_determinant = [](const Eigen::LLT<Eigen::MatrixXd>& factor) {
+    return factor.matrixLLT().diagonal().array().log().sum();
+  };
+  result.coefficients = hessian.solve(pull);
+  result.covariance = hessian.solve(Eigen::MatrixXd::Identity(pull.size(), pull.size()));
+  result.score += (pull.dot(result.coefficients) - prior.mean.dot(prior.precision * prior.mean)) / 2 +
+                  half_log_determinant(precision) - half_log_determinant(hessian);
+  for (Eigen::Index i = 0; i < pull.size(); ++i) {
     if (prior.sign[i] == 0) continue;
     result.score +=
         log_normal_cdf(prior.sign[i] * result.coefficients[i] / std::sqrt(result.covariance(i, i))) -
@@ -187,7 +137,7 @@ Weighed EvidenceSearch::weigh(const Set& set) const {
 std::vector<Option> EvidenceSearch::options(const Set& set) const {
   std::vector<Option> result;
   for (std::size_t e = 0; e < all_.entries.size(); ++e) {
-    if (has_entry(set, e)) continue;
+    if (has_entry(all_, set, e)) continue;
     std::vector<Option> all;
     for (std::size_t shape = 0; shape < all_.entries[e].first_column.size(); ++shape) {
       for (std::size_t scale = 0; scale < all_.entries[e].scales.size(); ++scale) {
@@ -238,8 +188,12 @@ Weighed EvidenceSearch::improved(Weighed now) const {
   return now;
 }
 
-Weighed EvidenceSearch::best() const {
-  Weighed now = weigh({});
+double EvidenceSearch::bits(const Weighed& best, std::size_t index) const {
+  return (best.score - weigh(without(best.set, index)).score) / kNatsPerBit;
+}
+
+Weighed EvidenceSearch::best(const Set& start) const {
+  Weighed now = improved(weigh(start));
   bool is_improved = true;
   while (now.set.size() < kMostExplanations) {
     const double least = now.score + kNamed_bits * kNatsPerBit;

@@ -1,9 +1,6 @@
 /// @file Search for the set of explanations with the largest posterior probability.
 ///
-/// Data and columns, whitened, are projected on an orthonormal basis of the instruments: some hundred numbers per axis,
-/// in which a disturbance is noise and the vehicle's answer to it has no part. The noise is estimated from the rest of
-/// the data, which no effect of the set points reaches. For a set with columns X, prior N(mu, P^-1) and data y of
-/// variance 1,
+/// For a set with columns X, prior N(mu, P^-1) and data y of variance 1,
 ///   ln p(y | set) = -1/2 (y - X c)'(y - X c) - 1/2 (c - mu)' P (c - mu) + 1/2 ln det P - 1/2 ln det H,
 /// H = X'X + P, c = H^-1 (X'y + P mu), up to a constant of the data; where a coefficient has a sign, the probabilities
 /// of the sign after and before the flights are added. Sets are compared by this number and ln p(set) alone.
@@ -12,6 +9,7 @@
 #include <vector>
 
 #include "analysis/identification/evidence/hypotheses.h"
+#include "analysis/identification/evidence/whitened.h"
 
 namespace swarmcert::evidence {
 
@@ -37,20 +35,28 @@ struct Option {
 
 class EvidenceSearch {
  public:
-  /// @param all with instruments; must outlive this object
-  explicit EvidenceSearch(const Hypotheses& all);
+  /// @param all, data must outlive this object
+  EvidenceSearch(const Hypotheses& all, const Whitened& data) : all_(all), data_(data) {}
 
   /// Returns the best set, by forward steps with removals and exchanges.
-  Weighed best() const;
+  /// @param start items to begin with
+  Weighed best(const Set& start = {}) const;
   /// Returns the effects that flights cannot tell from the item at `index` of best(): those with which, in its place,
   /// the set loses less than kNamed_bits; best first.
   std::vector<Option> instead_of(const Weighed& best, std::size_t index) const;
+  /// Returns by how much the item at `index` raises the evidence of the set, in bits.
+  double bits(const Weighed& best, std::size_t index) const;
+  Weighed weigh(const Set& set) const;
+  /// Returns the columns of a set, item by item.
+  std::vector<int> columns_of(const Set& set) const;
+  /// Returns y - X c.
+  Eigen::VectorXd left_by(const Weighed& found) const;
+  /// Joins the priors of the items of a set.
+  Prior prior_of(const Set& set) const;
 
  private:
-  /// Projects data and columns along each axis, [numbers x (columns, data)].
-  /// @param power of the noise, by band of the axis
-  Eigen::MatrixXd projected(std::size_t axis, const Eigen::VectorXd& power) const;
-  Weighed weigh(const Set& set) const;
+  /// Returns X'X, without forming products of the last item with what is not in the set, and X'y.
+  Normal normal_of(const Set& set) const;
   /// Returns what may be added to a set, best first.
   std::vector<Option> options(const Set& set) const;
   /// Removes and exchanges items while the score rises.
@@ -59,8 +65,7 @@ class EvidenceSearch {
   Weighed changed(const Weighed& now, std::size_t index) const;
 
   const Hypotheses& all_;
-  Eigen::MatrixXd columns_;  ///< [numbers x columns]
-  Eigen::VectorXd data_;
+  const Whitened& data_;
 };
 
 }  // namespace swarmcert::evidence

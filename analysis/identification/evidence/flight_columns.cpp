@@ -83,13 +83,13 @@ TrackColumns::TrackColumns(const identification::Passes& passes, const ModelledT
                            const identification::Grams& grams, const std::vector<CurveOver>& curves,
                            const std::vector<stability::Instant>& instants) {
   const auto records = static_cast<Eigen::Index>(instants.size());
-  const Eigen::Index width = grams.columns + static_cast<Eigen::Index>(curves.size()) * Curve::kSize;
-  for (Eigen::MatrixXf& axis : values_) axis.setZero(records, width + 1);
+  const Eigen::Index all = width(grams, curves);
+  for (Eigen::MatrixXf& axis : values_) axis.setZero(records, all + 1);
   add_effects(passes, modelled, grams, instants);
   add_curves(passes, modelled, curves, instants);
   for (Eigen::Index i = 0; i < records; ++i) {
     for (std::size_t axis = 0; axis < 3; ++axis)
-      values_[axis](i, width) = static_cast<float>(
+      values_[axis](i, all) = static_cast<float>(
           modelled.residual_N[static_cast<std::size_t>(i)][static_cast<Eigen::Index>(axis)]);
   }
 }
@@ -108,10 +108,10 @@ void TrackColumns::add_effects(const identification::Passes& passes, const Model
 void TrackColumns::add_curves(const identification::Passes& passes, const ModelledTrack& modelled,
                               const std::vector<CurveOver>& curves,
                               const std::vector<stability::Instant>& instants) {
-  const Eigen::Index width = static_cast<Eigen::Index>(curves.size()) * Curve::kSize;
-  const Eigen::Index first = values_[0].cols() - 1 - width;
-  residuals::MeasuredForce measured(modelled.track, modelled.model, static_cast<int>(width));
-  Eigen::Matrix3Xd forces(3, width);
+  const Eigen::Index count = static_cast<Eigen::Index>(curves.size()) * Curve::kSize + 3;
+  const Eigen::Index first = values_[0].cols() - 1 - count;
+  residuals::MeasuredForce measured(modelled.track, modelled.model, static_cast<int>(count));
+  Eigen::Matrix3Xd forces(3, count);
   for (std::size_t i = 0; i < instants.size(); ++i) {
     if (modelled.track.restarts[i] != 0) measured.restart();
     const stability::Instant& now = instants[i];
@@ -125,9 +125,10 @@ void TrackColumns::add_curves(const identification::Passes& passes, const Modell
       force.setZero();
       if (std::isfinite(value)) force = axis * curves[c].curve(value).transpose();
     }
+    forces.rightCols<3>() = now.R_WB;
     if (!passes.inputs.rules.has_published_signals()) measured.apply(now, forces);
     for (std::size_t axis = 0; axis < 3; ++axis)
-      values_[axis].row(static_cast<Eigen::Index>(i)).segment(first, width) =
+      values_[axis].row(static_cast<Eigen::Index>(i)).segment(first, count) =
           forces.row(static_cast<Eigen::Index>(axis)).cast<float>();
   }
 }

@@ -35,7 +35,8 @@ struct Survey {
 };
 Survey survey(const identification::Passes& passes);
 
-/// The forces in W of the columns of effects, of curves, and the residual, as the log would show them.
+/// The forces in W of the columns of effects, of curves, of constant forces along the three axes of the body, and the
+/// residual, as the log would show them.
 class TrackColumns {
  public:
   /// @param grams    defines the columns of effects
@@ -44,7 +45,14 @@ class TrackColumns {
                const identification::Grams& grams, const std::vector<CurveOver>& curves,
                const std::vector<stability::Instant>& instants);
 
-  /// Components along an axis, [records x (columns of effects, of curves, and the residual)].
+  static Eigen::Index width(const identification::Grams& grams, const std::vector<CurveOver>& curves) {
+    return body_column(grams, curves) + 3;
+  }
+  /// Returns the first column of the forces along the axes of the body.
+  static Eigen::Index body_column(const identification::Grams& grams, const std::vector<CurveOver>& curves) {
+    return grams.columns + static_cast<Eigen::Index>(curves.size()) * Curve::kSize;
+  }
+  /// Components along an axis, [records x (width() and the residual)].
   const Eigen::MatrixXf& along(int axis) const { return values_[static_cast<std::size_t>(axis)]; }
 
  private:

@@ -47,6 +47,7 @@ Entry entry_of(const identification::Candidate& candidate, std::vector<int> firs
   entry.name = candidate.name;
   entry.size = candidate.columns();
   entry.first_column = std::move(first_column);
+  entry.shapes = entry.first_column.size();
   entry.scales = {{0, 0}};
   entry.mean = entry.sign = Eigen::VectorXd::Zero(entry.size);
   entry.deviation = Eigen::VectorXd::Constant(entry.size, kUsual);
@@ -81,20 +82,38 @@ Entry entry_of(const CurveOver& over, int first_column, double weight_N) {
   return entry;
 }
 
-/// Writes the transforms of a track's columns and residual.
-void transform(const TrackColumns& values, const PlacedTrack& placed, Hypotheses& result) {
-  for (std::size_t s = 0; s < placed.stretches.size(); ++s) {
-    const auto put = [&](const Eigen::MatrixXf& series, Eigen::Index column, float* to) {
-      if (!series.col(column).isZero())
-        result.spectral.transform(placed.first_stretch + s, &series(placed.stretches[s].first, column), to);
-    };
-    for (int axis = 0; axis < 3; ++axis) {
-      const Eigen::MatrixXf& series = values.along(axis);
-      const auto a = static_cast<std::size_t>(axis);
-      for (Eigen::Index c = 0; c + 1 < series.cols(); ++c) put(series, c, result.columns[a].col(c).data());
-      put(series, series.cols() - 1, result.residual_N[a].data());
+/// Writes the transforms of the first columns of a track.
+void transform(const TrackColumns& values, const PlacedTrack& placed, const Spectral& spectral,
+               Columns& columns) {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const Eigen::MatrixXf& series = values.along(static_cast<int>(axis));
+    for (std::size_t s = 0; s < placed.stretches.size(); ++s) {
+      const int first = placed.stretches[s].first;
+      for (Eigen::Index c = 0; c < columns[axis].cols(); ++c) {
+        if (!series.col(c).isZero())
+          spectral.transform(placed.first_stretch + s, &series(first, c), columns[axis].col(c).data());
+      }
     }
   }
+}
+
+void transform_residual(const TrackColumns& values, const PlacedTrack& placed, Hypotheses& result) {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const Eigen::MatrixXf& series = values.along(static_cast<int>(axis));
+    for (std::size_t s = 0; s < placed.stretches.size(); ++s)
+      result.spectral.transform(placed.first_stretch + s,
+                                &series(placed.stretches[s].first, series.cols() - 1),
+                                result.residual_N[axis].data());
+  }
+}
+
+/// Calls use(modelled, placed) for each track.
+template <typename Use>
+void over_placed_tracks(const identification::Passes& passes, const Survey& surveyed, const Use& use) {
+  std::vector<std::size_t> next(passes.flights.size(), 0);  // track of each flight
+  over_modelled_tracks(passes, [&](std::size_t k, const identification::ModelledTrack& modelled) {
+    use(modelled, surveyed.tracks[k][next[k]++]);
+  });
 }
 
 }  // namespace
@@ -116,38 +135,42 @@ double Hypotheses::log_prior(const Item& item) const {
   const auto alike = std::count_if(entries.begin(), entries.end(),
                                    [&](const Entry& other) { return other.kind == entry.kind; });
   return -std::log(2.0 * static_cast<double>(alike)) -
-         std::log(static_cast<double>(entry.first_column.size() * entry.scales.size()));
+         std::log(static_cast<double>(entry.shapes * entry.scales.size()));
 }
 
 Hypotheses hypotheses(const identification::Passes& passes,
-                      std::vector<identification::Candidate> candidates) {
+                      const std::vector<identification::Candidate>& candidates) {
   constexpr double kSensor = 0.003;  // of the weight, per record
   const double weight_N = passes.inputs.model_of(passes.kind)->weight_N();
   const Survey surveyed = survey(passes);
-  const identification::Grams grams = identification::columns_of(std::move(candidates));
+  const identification::Grams grams = identification::columns_of(candidates);
   const Spectral spectral(surveyed.stretches);
   const NoiseModel noise(spectral.bands(), Eigen::Vector3d::Constant(std::pow(kSensor * weight_N, 2)));
-  const Eigen::Index width = grams.columns + static_cast<Eigen::Index>(surveyed.curves.size()) * Curve::kSize;
-  Hypotheses result{{}, spectral, noise, {}, {}, {}};
+  const Eigen::Index width = TrackColumns::width(grams, surveyed.curves);
+  Hypotheses result{candidates, {}, surveyed, spectral, noise, {}, {}, {}};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     result.columns[axis].setZero(spectral.rows(), width);
     result.residual_N[axis].setZero(spectral.rows());
   }
   Instruments instruments(spectral, width);
-  Energy energy(grams.columns);
-  std::vector<std::size_t> next(passes.flights.size(), 0);  // track of each flight
+  Energy energy(width);
   std::mutex mutex;
-  over_modelled_tracks(passes, [&](std::size_t k, const identification::ModelledTrack& modelled) {
-    const PlacedTrack& placed = surveyed.tracks[k][next[k]++];
-    const TrackColumns values(passes, modelled, grams, surveyed.curves, modelled.track.instants);
-    instruments.add(modelled, placed.stretches, placed.first_stretch,
-                    wanted_columns(passes, modelled, grams, surveyed.curves));
-    transform(values, placed, result);
-    const std::lock_guard<std::mutex> lock(mutex);
-    for (const Stretch& stretch : placed.stretches) energy.add(values, stretch);
-  });
-  for (std::size_t k = 0; k < grams.candidates.size(); ++k)
-    result.entries.push_back(entry_of(grams.candidates[k], grams.first_column[k], energy, weight_N));
+  over_placed_tracks(
+      passes, surveyed, [&](const identification::ModelledTrack& modelled, const PlacedTrack& placed) {
+        const TrackColumns values(passes, modelled, grams, surveyed.curves, modelled.track.instants);
+        instruments.add(modelled, placed.stretches, placed.first_stretch,
+                        wanted_columns(passes, modelled, grams, surveyed.curves));
+        transform(values, placed, spectral, result.columns);
+        transform_residual(values, placed, result);
+        const std::lock_guard<std::mutex> lock(mutex);
+        for (const Stretch& stretch : placed.stretches) energy.add(values, stretch);
+      });
+  for (std::size_t k = 0; k < candidates.size(); ++k) {
+    std::vector<int> first_column = grams.first_column[k];
+    if (candidates[k].info.traits.may_turn_with_body && candidates[k].vehicles.empty())
+      first_column.push_back(static_cast<int>(TrackColumns::body_column(grams, surveyed.curves)));
+    result.entries.push_back(entry_of(candidates[k], std::move(first_column), energy, weight_N));
+  }
   int column = grams.columns;
   for (const CurveOver& over : surveyed.curves) {
     result.entries.push_back(entry_of(over, column, weight_N));
@@ -155,6 +178,24 @@ Hypotheses hypotheses(const identification::Passes& passes,
   }
   result.instruments = instruments.of_axes();
   return result;
+}
+
+Columns evaluate(const identification::Passes& passes, const Hypotheses& all,
+                 const std::vector<Shape>& shapes) {
+  std::vector<identification::Candidate> candidates;
+  for (const Shape& shape : shapes) {
+    candidates.push_back(all.candidates[shape.entry]);
+    candidates.back().thetas = {shape.theta};
+  }
+  const identification::Grams grams = identification::columns_of(std::move(candidates));
+  Columns columns;
+  for (Eigen::MatrixXf& axis : columns) axis.setZero(all.spectral.rows(), grams.columns);
+  over_placed_tracks(passes, all.surveyed,
+                     [&](const identification::ModelledTrack& modelled, const PlacedTrack& placed) {
+                       const TrackColumns values(passes, modelled, grams, {}, modelled.track.instants);
+                       transform(values, placed, all.spectral, columns);
+                     });
+  return columns;
 }
 
 }  // namespace swarmcert::evidence

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "analysis/identification/candidates.h"
+#include "analysis/identification/evidence/flight_columns.h"
 #include "analysis/identification/evidence/noise_model.h"
 #include "analysis/identification/passes.h"
 
@@ -22,6 +23,7 @@ struct Entry {
   Kind kind = Kind::kEffect;
   int size = 1;                               ///< columns
   std::vector<int> first_column;              ///< by shape
+  std::size_t shapes = 1;                     ///< of the grid; later ones are off it
   std::vector<std::array<double, 2>> scales;  ///< of a curve: standard deviation in newton and smoothness
   Eigen::VectorXd mean, deviation, sign;      ///< of the coefficients, except of a curve; see Prior
 };
@@ -41,12 +43,17 @@ struct Item {
   }
 };
 
+/// Transforms of columns, by axis of the world, [rows x columns].
+using Columns = std::array<Eigen::MatrixXf, 3>;
+
 /// Explanations and flights, in the frequency domain.
 struct Hypotheses {
-  std::vector<Entry> entries;
+  std::vector<identification::Candidate> candidates;
+  std::vector<Entry> entries;  ///< those of the candidates in their order, then those of the curves
+  Survey surveyed;
   Spectral spectral;
   NoiseModel noise;
-  std::array<Eigen::MatrixXf, 3> columns;  ///< by axis of the world, [rows x columns]
+  Columns columns;
   std::array<Eigen::VectorXf, 3> residual_N;
 
   /// By axis, [rows x instruments]; empty if a log has no set points.
@@ -58,8 +65,18 @@ struct Hypotheses {
   double log_prior(const Item& item) const;
 };
 
-/// Evaluates `candidates` and curves over every variable of the scan along the flights.
+/// Evaluates `candidates` and curves over every variable of the scan along the flights of `passes`.
 Hypotheses hypotheses(const identification::Passes& passes,
-                      std::vector<identification::Candidate> candidates);
+                      const std::vector<identification::Candidate>& candidates);
+
+/// An entry with shape parameters.
+struct Shape {
+  std::size_t entry;
+  std::vector<double> theta;
+};
+
+/// Evaluates effects with these shapes along the flights: their columns, one shape after the other.
+Columns evaluate(const identification::Passes& passes, const Hypotheses& all,
+                 const std::vector<Shape>& shapes);
 
 }  // namespace swarmcert::evidence

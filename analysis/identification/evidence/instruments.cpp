@@ -1,16 +1,17 @@
 #include "analysis/identification/evidence/instruments.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <random>
 
 namespace swarmcert::evidence {
 namespace {
 
 constexpr double kLag_s = 0.07;
 constexpr int kLags = 8;
-/// Instruments from the columns along the set points: their strongest components along each axis.
-constexpr Eigen::Index kMostComponents = 40;
+/// Instruments along each axis from the columns along the set points.
+constexpr Eigen::Index kMixtures = 48;
 
 /// Returns `series` delayed by a number of records, with its first value before its start.
 Eigen::VectorXf delayed(const Eigen::Ref<const Eigen::VectorXf>& series, std::ptrdiff_t records) {
@@ -37,18 +38,16 @@ Eigen::MatrixXf commanded_signals(const residuals::Track& track) {
   return signals;
 }
 
-/// Returns the strongest principal components of columns scaled to equal power, [rows x components].
-Eigen::MatrixXf components(const Eigen::MatrixXf& columns, Eigen::Index most) {
-  std::vector<Eigen::Index> used;
-  for (Eigen::Index c = 0; c < columns.cols(); ++c) {
-    if (columns.col(c).squaredNorm() > 0) used.push_back(c);
-  }
-  if (used.empty()) return Eigen::MatrixXf(columns.rows(), 0);
-  Eigen::MatrixXf scaled = columns(Eigen::all, used);
-  scaled.colwise().normalize();
-  const Eigen::MatrixXf gram = scaled.transpose() * scaled;
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXf> parts(gram);
-  return scaled * parts.eigenvectors().rightCols(std::min<Eigen::Index>(most, gram.cols()));
+/// Returns mixtures with random weights of the columns scaled to equal power, [rows x mixtures]. Nearly always, they span
+/// the strongest directions of the columns (Halko, Martinsson & Tropp 2011).
+Eigen::MatrixXf mixtures(const Eigen::MatrixXf& columns) {
+  std::mt19937_64 random(1);
+  std::normal_distribution<float> normal;
+  Eigen::MatrixXf weights =
+      Eigen::MatrixXf::NullaryExpr(columns.cols(), kMixtures, [&] { return normal(random); });
+  for (Eigen::Index c = 0; c < columns.cols(); ++c)
+    weights.row(c) /= std::max(columns.col(c).norm(), std::numeric_limits<float>::min());
+  return columns * weights;
 }
 
 }  // namespace
@@ -94,7 +93,7 @@ std::array<Eigen::MatrixXf, 3> Instruments::of_axes() const {
   std::array<Eigen::MatrixXf, 3> result;
   if (!is_complete_) return result;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    const Eigen::MatrixXf more = components(wanted_[axis], kMostComponents);
+    const Eigen::MatrixXf more = mixtures(wanted_[axis]);
     result[axis].resize(commanded_.rows(), commanded_.cols() + more.cols());
     result[axis] << commanded_, more;
   }

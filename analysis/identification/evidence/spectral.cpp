@@ -101,7 +101,7 @@ Spectral::Spectral(std::vector<Stretch> stretches) : stretches_(std::move(stretc
 }
 
 void Spectral::transform(std::size_t stretch, const float* series, float* to) const {
-  Eigen::FFT<float> fft;
+  static thread_local Eigen::FFT<float> fft;  // keeps its factors from one series to the next
   fft.SetFlag(Eigen::FFT<float>::HalfSpectrum);
   const int count = stretches_[stretch].count;
   std::vector<float> values(series, series + count);

@@ -1,0 +1,36 @@
+/// @file The set of effects and curves that explains a residual best.
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "analysis/identification/candidates.h"
+#include "analysis/identification/passes.h"
+
+namespace swarmcert::evidence {
+
+/// An effect of the best set.
+struct Named {
+  identification::Candidate candidate;  ///< with a single theta, the best one
+  std::size_t index = 0;                ///< among the candidates
+  double evidence_bits = 0;             ///< by which the set loses without it
+  double value = 0, deviation = 0;      ///< estimate of the first coefficient, with its standard deviation
+  /// Effects that flights cannot tell from it, with their odds over it.
+  std::vector<std::pair<std::string, double>> others;
+};
+
+struct Explanations {
+  std::vector<Named> effects;       ///< in the order of their evidence
+  std::vector<std::string> curves;  ///< free curves beside them: "force_z over z"
+  /// The data are what set points can have caused. Otherwise a log has none, and the answer of a controller to a
+  /// disturbance may look like an effect of thrust or velocity.
+  bool is_by_set_points = false;
+};
+
+/// Returns the best set of `candidates` and free curves for the residual of all flights. The deviations hold for the
+/// shape of the single theta.
+Explanations explanations(const identification::Passes& passes,
+                          const std::vector<identification::Candidate>& candidates);
+
+}  // namespace swarmcert::evidence
