@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <cstdlib>
 #include <map>
 #include <optional>
 #include <set>
@@ -18,6 +20,11 @@
 
 namespace swarmcert::identification {
 namespace {
+FILE* dbg() {
+  static FILE* f = fopen("/tmp/dbg", "a");
+  setbuf(f, nullptr);
+  return f;
+}
 
 /// A formula replaces named effects if it leaves less than this fraction of the mean square, which favours names.
 constexpr double kClearlyLess = 0.9;
@@ -58,12 +65,27 @@ std::set<std::string> out_of_bounds(const Selected& selected) {
   return names;
 }
 
+/// Adds the drag law that replaces named drags as the first formula, and its curve, whose entries stay sorted by share.
+void add_drag_law(const ScanSamples& left, Explained& explained) {
+  std::optional<DragLaw> law = drag_law(left, {});
+  ScanEntry entry = along_velocity(left);
+  if (!law || entry.curve.empty()) return;
+  std::vector<ScanEntry>& entries = explained.scan.entries;
+  const auto place = std::find_if(entries.begin(), entries.end(),
+                                  [&](const ScanEntry& other) { return other.share < entry.share; });
+  law->formula.entry = static_cast<std::size_t>(place - entries.begin());
+  for (Formula& formula : explained.formulas) formula.entry += formula.entry >= law->formula.entry ? 1 : 0;
+  entries.insert(place, std::move(entry));
+  explained.formulas.insert(explained.formulas.begin(), std::move(law->formula));
+}
+
 /// Scans the remainder beside the effects found.
 /// @return the samples of that remainder
 ScanSamples scan_what_is_left(const Passes& passes, Explained& explained) {
   ScanSamples left = scan_samples(passes, specs_of(explained.settled.ranking));
   explained.scan = scan(left, passes.jobs);
   explained.formulas = find_formulas(left, explained.scan, kMostFormulas, passes.jobs);
+  if (explained.has_drag_law) add_drag_law(left, explained);
   return left;
 }
 
@@ -149,31 +171,58 @@ void set_evidence(const evidence::Explanations& found, std::vector<Missing>& ran
   }
 }
 
-Settled settle(const Passes& passes, std::vector<Candidate> candidates) {
+/// Returns a load on a string, if what is found may be a load and the flights show that it swings.
+std::optional<Candidate> swinging_load(const Passes& passes, const Coverage& covered,
+                                       const std::vector<Missing>& ranking) {
+  const std::vector<stability::EffectSpec>& own = passes.inputs.model_of(passes.kind)->effects;
+  if (std::any_of(own.begin(), own.end(), [](const auto& spec) { return swings(spec.name); })) return {};
+  std::vector<stability::EffectSpec> beside;
+  bool may_be_load = false;
+  for (const Missing& missing : ranking) {
+    if (is_scale(missing.effect) || is_push(missing.effect))
+      may_be_load = true;
+    else
+      beside.insert(beside.end(), missing.specs.begin(), missing.specs.end());
+  }
+  return may_be_load ? visible_pendulum(passes, covered, beside) : std::nullopt;
+}
+
+/// Weighs the candidates, without those that prove doubtful.
+Explained settle(const Passes& passes, std::vector<Candidate> candidates) {
   constexpr int kMostRounds = 4;
-  Settled result;
+  Explained result;
+  Settled& settled = result.settled;
   for (int round = 0; round < kMostRounds; ++round) {
     const evidence::Explanations found = evidence::explanations(passes, candidates);
-    result.selected = selected_of(passes, candidates, found);
-    result.ranking = ranking_of(passes, result.selected);
-    set_evidence(found, result.ranking);
-    const std::set<std::string> beyond = out_of_bounds(result.selected);
-    result.at_bound.insert(beyond.begin(), beyond.end());
-    std::set<std::string> doubtful = unhelpful(result.selected);
+    settled.selected = selected_of(passes, candidates, found);
+    settled.ranking = ranking_of(passes, settled.selected);
+    set_evidence(found, settled.ranking);
+    result.has_drag_law = found.has_drag_curve;
+    const std::set<std::string> beyond = out_of_bounds(settled.selected);
+    settled.at_bound.insert(beyond.begin(), beyond.end());
+    std::set<std::string> doubtful = unhelpful(settled.selected);
+    if (true)
+      for (const auto& n : doubtful) fprintf(dbg(), "  DBG unhelpful %s\n", n.c_str());
     doubtful.insert(beyond.begin(), beyond.end());
+    doubtful.insert(found.refuted.begin(), found.refuted.end());
+    for (const auto& n : found.refuted) fprintf(dbg(), "  DBG refuted %s\n", n.c_str());
     if (doubtful.empty()) break;
-    result.suspected.insert(result.suspected.end(), doubtful.begin(), doubtful.end());
+    settled.suspected.insert(settled.suspected.end(), doubtful.begin(), doubtful.end());
     erase(candidates, doubtful);
   }
-  result.rest = remainder(passes, specs_of(result.ranking));
   return result;
 }
 
 }  // namespace
 
 Explained explain(const Passes& passes, const Coverage& covered) {
-  Explained explained;
-  explained.settled = settle(passes, candidates_to_weigh(passes, covered));
+  std::vector<Candidate> candidates = candidates_to_weigh(passes, covered);
+  Explained explained = settle(passes, candidates);
+  if (const auto load = swinging_load(passes, covered, explained.settled.ranking)) {
+    candidates.push_back(*load);
+    explained = settle(passes, candidates);
+  }
+  explained.settled.rest = remainder(passes, specs_of(explained.settled.ranking));
   scan_what_is_left(passes, explained);
   return explained;
 }

@@ -27,10 +27,20 @@ Set with(Set set, const Item& item) {
   return set;
 }
 
-/// Returns whether a set has the entry, or another of the same name.
+/// Returns whether both describe the wake of a neighbour, of which there is one.
+bool is_same_wake(const Hypotheses& all, std::size_t a, std::size_t b) {
+  const auto is_wake = [&](std::size_t entry) {
+    if (all.entries[entry].kind != Kind::kEffect) return false;
+    const stability::EffectTraits& traits = all.candidates[entry].info.traits;
+    return traits.family == stability::Family::kWake || traits.reduces_to == stability::Family::kWake;
+  };
+  return is_wake(a) && is_wake(b);
+}
+
+/// Returns whether a set has the entry, or one that excludes it.
 bool has_entry(const Hypotheses& all, const Set& set, std::size_t entry) {
   return std::any_of(set.begin(), set.end(), [&](const Item& item) {
-    return all.entries[item.entry].name == all.entries[entry].name;
+    return all.entries[item.entry].name == all.entries[entry].name || is_same_wake(all, item.entry, entry);
   });
 }
 
@@ -69,7 +79,7 @@ Prior EvidenceSearch::prior_of(const Set& set) const {
   Prior prior{Eigen::VectorXd::Zero(size), Eigen::MatrixXd::Zero(size, size), Eigen::VectorXd::Zero(size)};
   Eigen::Index first = 0;
   for (const Item& item : set) {
-    const Prior part = all_.prior_of(item);
+    const Prior& part = all_.prior_of(item);
     const Eigen::Index n = part.mean.size();
     prior.mean.segment(first, n) = part.mean;
     prior.sign.segment(first, n) = part.sign;
@@ -134,81 +144,71 @@ Weighed EvidenceSearch::weigh(const Set& set) const {
   return result;
 }
 
+Option EvidenceSearch::option(const Set& set, std::size_t entry) const {
+  std::vector<Option> all;
+  for (std::size_t shape = 0; shape < all_.entries[entry].first_column.size(); ++shape) {
+    for (std::size_t prior = 0; prior < all_.entries[entry].priors.size(); ++prior) {
+      const Item item{entry, shape, prior};
+      all.push_back({item, weigh(with(set, item)).score});
+    }
+  }
+  Option best = *std::max_element(all.begin(), all.end(),
+                                  [](const Option& a, const Option& b) { return a.score < b.score; });
+  double sum = 0;
+  for (const Option& other : all) sum += std::exp(other.score - best.score);
+  best.score += std::log(sum);
+  return best;
+}
+
 std::vector<Option> EvidenceSearch::options(const Set& set) const {
   std::vector<Option> result;
   for (std::size_t e = 0; e < all_.entries.size(); ++e) {
-    if (has_entry(all_, set, e)) continue;
-    std::vector<Option> all;
-    for (std::size_t shape = 0; shape < all_.entries[e].first_column.size(); ++shape) {
-      for (std::size_t scale = 0; scale < all_.entries[e].scales.size(); ++scale) {
-        const Item item{e, shape, scale};
-        all.push_back({item, weigh(with(set, item)).score});
-      }
-    }
-    Option best = *std::max_element(all.begin(), all.end(),
-                                    [](const Option& a, const Option& b) { return a.score < b.score; });
-    double sum = 0;
-    for (const Option& option : all) sum += std::exp(option.score - best.score);
-    best.score += std::log(sum);
-    result.push_back(best);
+    if (!has_entry(all_, set, e)) result.push_back(option(set, e));
   }
   std::sort(result.begin(), result.end(), [](const Option& a, const Option& b) { return a.score > b.score; });
   return result;
 }
 
-Weighed EvidenceSearch::changed(const Weighed& now, std::size_t index) const {
-  const Set rest = without(now.set, index);
-  Weighed removed = weigh(rest);
-  if (removed.score > now.score) return removed;
-  const Option other = options(rest).front();
-  const bool loses_name = is_effect(all_, now.set[index]) && !is_effect(all_, other.item);
-  const double needed_bits = loses_name ? kNamed_bits : kExchanged_bits;
-  if (other.score > now.score + needed_bits * kNatsPerBit && !(other.item == now.set[index]))
-    return weigh(with(rest, other.item));
-  return now;
+double EvidenceSearch::bits(const Weighed& best, std::size_t index) const {
+  const Set rest = without(best.set, index);
+  return (option(rest, best.set[index].entry).score - weigh(rest).score) / kNatsPerBit;
 }
 
 std::vector<Option> EvidenceSearch::instead_of(const Weighed& best, std::size_t index) const {
   std::vector<Option> result;
+  const auto by_flights = [&](double score, const Item& item) {
+    return score + all_.entries[item.entry].doubt;
+  };
+  const double least = by_flights(best.score, best.set[index]) - kNamed_bits * kNatsPerBit;
   for (const Option& option : options(without(best.set, index))) {
-    const bool is_close = option.score > best.score - kNamed_bits * kNatsPerBit;
+    const bool is_close = by_flights(option.score, option.item) > least;
     if (is_effect(all_, option.item) && is_close && option.item.entry != best.set[index].entry)
       result.push_back(option);
   }
   return result;
 }
 
-Weighed EvidenceSearch::improved(Weighed now) const {
+Set EvidenceSearch::changed(const Weighed& now, std::size_t index) const {
+  if (bits(now, index) < kNamed_bits) return without(now.set, index);
+  const Set rest = without(now.set, index);
+  const Option other = options(rest).front();
+  const bool loses_name = is_effect(all_, now.set[index]) && !is_effect(all_, other.item);
+  const double needed_bits = loses_name ? kNamed_bits : kExchanged_bits;
+  const bool is_better = other.score > now.score + needed_bits * kNatsPerBit;
+  return is_better && !(other.item == now.set[index]) ? with(rest, other.item) : now.set;
+}
+
+Weighed EvidenceSearch::next(const Weighed& now) const {
+  const double least = now.score + kNamed_bits * kNatsPerBit;
+  const Option added = preferred(all_, options(now.set), least);
+  const bool is_enough = added.score >= least && now.set.size() < kMostExplanations;
+  if (is_enough && is_effect(all_, added.item)) return weigh(with(now.set, added.item));
+  // No further effect: the set is complete enough to be judged.
   for (std::size_t i = 0; i < now.set.size(); ++i) {
-    Weighed next = changed(now, i);
-    if (!(next.score > now.score)) continue;
-    now = std::move(next);
-    i = static_cast<std::size_t>(-1);  // from the beginning
+    const Set other = changed(now, i);
+    if (!(other == now.set)) return weigh(other);
   }
-  return now;
-}
-
-double EvidenceSearch::bits(const Weighed& best, std::size_t index) const {
-  return (best.score - weigh(without(best.set, index)).score) / kNatsPerBit;
-}
-
-Weighed EvidenceSearch::best(const Set& start) const {
-  Weighed now = improved(weigh(start));
-  bool is_improved = true;
-  while (now.set.size() < kMostExplanations) {
-    const double least = now.score + kNamed_bits * kNatsPerBit;
-    const Option next = preferred(all_, options(now.set), least);
-    const bool adds_effect = next.score >= least && is_effect(all_, next.item);
-    if (!adds_effect && !is_improved) {  // no further effect: the set is complete enough to be judged
-      now = improved(std::move(now));
-      is_improved = true;
-      continue;
-    }
-    if (next.score < least) return now;
-    now = weigh(with(now.set, next.item));
-    is_improved = false;
-  }
-  return improved(std::move(now));
+  return is_enough ? weigh(with(now.set, added.item)) : now;
 }
 
 }  // namespace swarmcert::evidence

@@ -13,9 +13,9 @@
 
 namespace swarmcert::evidence {
 
-/// An explanation is added if the set gains odds of 128 : 1, exchanged if it gains 4 : 1, and removed if the set gains
-/// anything without it. Effects are added before curves; a curve takes the place of an effect with the former odds:
-/// below, flights cannot tell them apart.
+/// An explanation is added if the set gains odds of 128 : 1, removed if it gains less, and exchanged if it gains 4 : 1.
+/// Effects are added before curves; a curve takes the place of an effect with the former odds: below, flights cannot
+/// tell them apart.
 inline constexpr double kNamed_bits = 7, kExchanged_bits = 2;
 
 using Set = std::vector<Item>;
@@ -30,7 +30,7 @@ struct Weighed {
 /// Something to add to a set.
 struct Option {
   Item item;         ///< the best of its entry
-  double score = 0;  ///< of the set with it, summed over the shapes and scales of the entry
+  double score = 0;  ///< of the set with it, summed over the shapes and priors of the entry
 };
 
 class EvidenceSearch {
@@ -38,13 +38,13 @@ class EvidenceSearch {
   /// @param all, data must outlive this object
   EvidenceSearch(const Hypotheses& all, const Whitened& data) : all_(all), data_(data) {}
 
-  /// Returns the best set, by forward steps with removals and exchanges.
-  /// @param start items to begin with
-  Weighed best(const Set& start = {}) const;
-  /// Returns the effects that flights cannot tell from the item at `index` of best(): those with which, in its place,
-  /// the set loses less than kNamed_bits; best first.
+  /// Takes a step to a better set: adds an effect, or removes or exchanges something, or adds a curve. Returns `now` if
+  /// there is none.
+  Weighed next(const Weighed& now) const;
+  /// Returns the effects that flights cannot tell from the item at `index`: those with which, in its place,
+  /// the set loses less than kNamed_bits, whatever was likely before the flights; best first.
   std::vector<Option> instead_of(const Weighed& best, std::size_t index) const;
-  /// Returns by how much the item at `index` raises the evidence of the set, in bits.
+  /// Returns by how much the entry of the item at `index` raises the evidence of the set, in bits.
   double bits(const Weighed& best, std::size_t index) const;
   Weighed weigh(const Set& set) const;
   /// Returns the columns of a set, item by item.
@@ -57,12 +57,12 @@ class EvidenceSearch {
  private:
   /// Returns X'X, without forming products of the last item with what is not in the set, and X'y.
   Normal normal_of(const Set& set) const;
+  /// Returns the best shape and prior of an entry beside a set.
+  Option option(const Set& set, std::size_t entry) const;
   /// Returns what may be added to a set, best first.
   std::vector<Option> options(const Set& set) const;
-  /// Removes and exchanges items while the score rises.
-  Weighed improved(Weighed now) const;
-  /// Removes or replaces the item at `index` if that raises the score, and returns the result.
-  Weighed changed(const Weighed& now, std::size_t index) const;
+  /// Returns the set without the item at `index`, or with another in its place, if that is better.
+  Set changed(const Weighed& now, std::size_t index) const;
 
   const Hypotheses& all_;
   const Whitened& data_;

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <cstdlib>
 
 #include "analysis/identification/evidence/evidence_search.h"
 #include "analysis/identification/evidence/projection.h"
@@ -9,6 +11,11 @@
 
 namespace swarmcert::evidence {
 namespace {
+FILE* dbg() {
+  static FILE* f = fopen("/tmp/dbg", "a");
+  setbuf(f, nullptr);
+  return f;
+}
 
 /// The best set, with the data that it explains.
 struct Found {
@@ -16,16 +23,27 @@ struct Found {
   Weighed best;
 };
 
-/// Searches, moves shapes off the grid, and searches again from there: what a coarse grid leaves is no other effect.
+/// Returns whether the sets have the same entries.
+bool has_same_entries(const Set& a, const Set& b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                    [](const Item& x, const Item& y) { return x.entry == y.entry; });
+}
+
+/// Searches step by step. After each, shapes move off the grid: what a coarse grid leaves is no other effect.
 Found found_on(const identification::Passes& passes, const Projection& projection, Hypotheses& all,
-               Set start) {
-  constexpr int kMostRounds = 4;
+               const Set& start) {
+  constexpr int kMostSteps = 40;
   Found found{{projection.of(all.columns), projection.of(all.residual_N)}, {}};
-  for (int round = 0; round < kMostRounds; ++round) {
-    found.best = EvidenceSearch(all, found.data).best(start);
-    found.best = with_free_shapes(passes, projection, all, found.data, std::move(found.best));
-    if (found.best.set == start) break;
-    start = found.best.set;
+  found.best = EvidenceSearch(all, found.data).weigh(start);
+  for (int step = 0; step < kMostSteps; ++step) {
+    Weighed next = EvidenceSearch(all, found.data).next(found.best);
+    {
+      std::string w;
+      for (const Item& i : next.set) w += " " + all.entries[i.entry].name;
+      fprintf(dbg(), "    step %d %.1f:%s\n", step, next.score, w.c_str());
+    }
+    if (has_same_entries(next.set, found.best.set)) break;
+    found.best = with_free_shapes(passes, projection, all, found.data, std::move(next));
   }
   return found;
 }
@@ -51,9 +69,22 @@ Found found_in_everything(const identification::Passes& passes, Hypotheses& all)
     const Set before = found.best.set;
     power = power_beside(all, EvidenceSearch(all, found.data).columns_of(before), found.best.coefficients);
     found = found_on(passes, Projection::on_everything(all, power), all, before);
-    if (found.best.set == before) break;
+    if (has_same_entries(found.best.set, before)) break;
   }
   return found;
+}
+
+/// Returns whether a curve over the own variable of the effect at `index` has a tenth of its evidence.
+bool is_refuted(const Hypotheses& all, const EvidenceSearch& search, const Weighed& best, std::size_t index) {
+  constexpr double kOfEffect = 0.1;
+  const stability::EffectTraits& traits = all.candidates[best.set[index].entry].info.traits;
+  const double least_bits = kOfEffect * search.bits(best, index);
+  for (std::size_t i = 0; i < best.set.size(); ++i) {
+    const Entry& entry = all.entries[best.set[i].entry];
+    if (entry.kind == Kind::kCurve && traits.varies_with(entry.variable) && search.bits(best, i) > least_bits)
+      return true;
+  }
+  return false;
 }
 
 Named named(const Hypotheses& all, const EvidenceSearch& search, const Weighed& best, std::size_t index,
@@ -79,9 +110,31 @@ Explanations explanations(const identification::Passes& passes,
   Hypotheses all = hypotheses(passes, candidates);
   Explanations result;
   result.is_by_set_points = all.instruments[0].size() > 0;
-  const Found found =
-      result.is_by_set_points ? found_by_set_points(passes, all) : found_in_everything(passes, all);
+  Found found = result.is_by_set_points ? found_by_set_points(passes, all) : found_in_everything(passes, all);
   const EvidenceSearch search(all, found.data);
+  if (true) {
+    Eigen::Index at = 0;
+    for (std::size_t i = 0; i < found.best.set.size(); ++i) {
+      const Item& item = found.best.set[i];
+      const Entry& e = all.entries[item.entry];
+      fprintf(dbg(), "  DBG %s shape %zu of %zu bits %.1f c", e.name.c_str(), item.shape, e.shapes,
+              search.bits(found.best, i));
+      for (int c = 0; c < std::min(e.size, 3); ++c)
+        fprintf(dbg(), " %.4g+-%.2g", found.best.coefficients[at + c],
+                std::sqrt(found.best.covariance(at + c, at + c)));
+      if (e.kind == Kind::kEffect && item.shape < all.candidates[item.entry].thetas.size())
+        for (double t : all.candidates[item.entry].thetas[item.shape]) fprintf(dbg(), " th %.4g", t);
+      for (const Option& o : search.instead_of(found.best, i))
+        fprintf(dbg(), " | %s %.1f", all.entries[o.item.entry].name.c_str(),
+                (o.score - found.best.score) / std::log(2.0));
+      fprintf(dbg(), "\n");
+      at += e.size;
+    }
+    fprintf(dbg(), "  DBG score %.1f bits, misfit %.2f, set points %d\n",
+            (found.best.score + found.data.data_square() / 2) / std::log(2.0),
+            search.left_by(found.best).squaredNorm() / (double)found.data.data().size(),
+            (int)result.is_by_set_points);
+  }
   Eigen::Index first = 0;
   for (std::size_t i = 0; i < found.best.set.size(); ++i) {
     const Entry& entry = all.entries[found.best.set[i].entry];
@@ -89,6 +142,9 @@ Explanations explanations(const identification::Passes& passes,
       result.effects.push_back(named(all, search, found.best, i, first));
     else
       result.curves.push_back(entry.name);
+    if (entry.kind == Kind::kEffect && is_refuted(all, search, found.best, i))
+      result.refuted.push_back(entry.name);
+    if (entry.name == kDragCurve) result.has_drag_curve = true;
     first += entry.size;
   }
   std::stable_sort(result.effects.begin(), result.effects.end(),

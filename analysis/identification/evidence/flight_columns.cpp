@@ -48,15 +48,29 @@ std::vector<CurveOver> curves_over(std::vector<std::vector<double>>& by_variable
     const auto variable = static_cast<ScanVariable>(v);
     const Curve curve(values);
     const identification::ScanVariableInfo& info = identification::scan_variable(variable);
-    for (const bool is_in_body : {false, true}) {
-      if (!curve.varies() || !(is_in_body ? info.in_body : info.in_world)) continue;
-      for (int axis = 0; axis < 3; ++axis) result.push_back({variable, is_in_body, axis, curve});
+    if (!curve.varies()) continue;
+    for (int axis = 0; axis < 3; ++axis) {
+      if (info.in_world) result.push_back({variable, Frame::kWorld, axis, curve});
+      if (info.in_body) result.push_back({variable, Frame::kBody, axis, curve});
     }
+    if (variable == ScanVariable::kSpeed) result.push_back({variable, Frame::kVelocity, 0, curve});
   }
   return result;
 }
 
 }  // namespace
+
+Eigen::Vector3d CurveOver::direction(const stability::Instant& now) const {
+  switch (frame) {
+    case Frame::kWorld:
+      return Eigen::Vector3d::Unit(axis);
+    case Frame::kBody:
+      return now.R_WB.col(axis);
+    case Frame::kVelocity:
+      return now.v_W_m_s.normalized();
+  }
+  return Eigen::Vector3d::Zero();
+}
 
 Survey survey(const identification::Passes& passes) {
   Survey result;
@@ -68,6 +82,9 @@ Survey survey(const identification::Passes& passes) {
     const std::lock_guard<std::mutex> lock(mutex);
     add_values(modelled.track, placed.stretches, by_variable);
     result.tracks[k].push_back(std::move(placed));
+    std::vector<std::string>& vehicles = result.vehicles;
+    if (std::find(vehicles.begin(), vehicles.end(), modelled.track.vehicle) == vehicles.end())
+      vehicles.push_back(modelled.track.vehicle);
   });
   for (std::vector<PlacedTrack>& flight : result.tracks) {
     for (PlacedTrack& placed : flight) {
@@ -118,12 +135,9 @@ void TrackColumns::add_curves(const identification::Passes& passes, const Modell
     const identification::ScanValues values = identification::scan_values(now);
     for (std::size_t c = 0; c < curves.size(); ++c) {
       const double value = values[static_cast<std::size_t>(curves[c].variable)];
-      const Eigen::Vector3d axis = curves[c].is_in_body
-                                       ? Eigen::Vector3d(now.R_WB.col(curves[c].axis))
-                                       : Eigen::Vector3d(Eigen::Vector3d::Unit(curves[c].axis));
       auto force = forces.middleCols<Curve::kSize>(static_cast<Eigen::Index>(c) * Curve::kSize);
       force.setZero();
-      if (std::isfinite(value)) force = axis * curves[c].curve(value).transpose();
+      if (std::isfinite(value)) force = curves[c].direction(now) * curves[c].curve(value).transpose();
     }
     forces.rightCols<3>() = now.R_WB;
     if (!passes.inputs.rules.has_published_signals()) measured.apply(now, forces);

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <string>
 #include <vector>
 
 #include "analysis/identification/block_grams.h"
@@ -13,12 +14,21 @@
 
 namespace swarmcert::evidence {
 
-/// A free curve: its variable, and the axis of its force.
+/// Where the force of a curve points.
+enum class Frame {
+  kWorld,    ///< along an axis of the world
+  kBody,     ///< of the body
+  kVelocity  ///< along the velocity: a drag of any form
+};
+
+/// A free curve: its variable, and the direction of its force.
 struct CurveOver {
   identification::ScanVariable variable;
-  bool is_in_body;
+  Frame frame;
   int axis;
   Curve curve;
+
+  Eigen::Vector3d direction(const stability::Instant& now) const;
 };
 
 /// The stretches of a track, and where they stand among those of all tracks.
@@ -32,6 +42,7 @@ struct Survey {
   std::vector<std::vector<PlacedTrack>> tracks;  ///< by flight
   std::vector<Stretch> stretches;
   std::vector<CurveOver> curves;
+  std::vector<std::string> vehicles;  ///< that flew
 };
 Survey survey(const identification::Passes& passes);
 

@@ -14,6 +14,10 @@ namespace {
 
 /// Standard deviation of the force of an effect or curve where it acts, in weights, before any flight.
 constexpr double kUsual = 0.1;
+/// Odds against the form of an effect that varies, over its plain form.
+constexpr double kVaries_bits = 7;
+/// Effects that are larger than usual, in multiples of it.
+constexpr double kLarge = 10;
 /// Of a coefficient that is excluded.
 constexpr double kNone = 1e-9;
 
@@ -41,6 +45,30 @@ struct Energy {
   Eigen::ArrayXd squares, fourths;
 };
 
+/// Returns the sets of coefficients that may act: of up to three any of them, since a wind need not have all components.
+std::vector<unsigned> acting(int size) {
+  const unsigned all = (1U << std::min(size, 31)) - 1;
+  if (size > 3) return {all};
+  std::vector<unsigned> sets;
+  for (unsigned set = 1; set <= all; ++set) sets.push_back(set);
+  return sets;
+}
+
+std::vector<Prior> priors_of(const Eigen::VectorXd& deviation, const Eigen::VectorXd& sign) {
+  std::vector<Prior> priors;
+  for (const double scale : {1.0, kLarge}) {
+    for (const unsigned set : acting(static_cast<int>(deviation.size()))) {
+      Eigen::VectorXd own = scale * deviation;
+      for (Eigen::Index c = 0; c < own.size() && own.size() <= 3; ++c) {
+        if ((set >> c & 1U) == 0) own[c] = kNone;
+      }
+      priors.push_back(
+          {Eigen::VectorXd::Zero(own.size()), own.cwiseAbs2().cwiseInverse().asDiagonal(), sign});
+    }
+  }
+  return priors;
+}
+
 Entry entry_of(const identification::Candidate& candidate, std::vector<int> first_column,
                const Energy& energy, double weight_N) {
   Entry entry;
@@ -48,36 +76,53 @@ Entry entry_of(const identification::Candidate& candidate, std::vector<int> firs
   entry.size = candidate.columns();
   entry.first_column = std::move(first_column);
   entry.shapes = entry.first_column.size();
-  entry.scales = {{0, 0}};
-  entry.mean = entry.sign = Eigen::VectorXd::Zero(entry.size);
-  entry.deviation = Eigen::VectorXd::Constant(entry.size, kUsual);
+  if (candidate.info.traits.reduces_to != stability::Family::kNone)
+    entry.doubt = kVaries_bits * std::log(2.0);
+  Eigen::VectorXd deviation(entry.size), sign = Eigen::VectorXd::Zero(entry.size);
   for (int c = 0; c < entry.size; ++c) {
     const stability::Parameter& parameter = candidate.info.linear[static_cast<std::size_t>(c)];
-    if (parameter.lower >= 0 && parameter.upper > 0) entry.sign[c] = 1;
-    if (parameter.upper <= 0 && parameter.lower < 0) entry.sign[c] = -1;
-    if (candidate.info.remembers) {
-      entry.mean[c] = 1;  // the gain of a lag or delay
-      continue;
-    }
+    if (parameter.lower >= 0 && parameter.upper > 0) sign[c] = 1;
+    if (parameter.upper <= 0 && parameter.lower < 0) sign[c] = -1;
     double force_N = 0;  // per unit of the coefficient, the largest among the shapes
     for (const int first : entry.first_column)
       force_N = std::max(force_N, energy.force_where_it_acts(first + c));
     const bool is_free = force_N > 0 && !identification::is_held_at_zero(parameter);
-    entry.deviation[c] = is_free ? kUsual * weight_N / force_N : kNone;
+    deviation[c] = is_free ? kUsual * weight_N / force_N : kNone;
+  }
+  if (candidate.info.remembers) {  // the gain of a lag or delay is 1
+    const auto n = static_cast<Eigen::Index>(entry.size);
+    entry.priors = {{Eigen::VectorXd::Ones(n), Eigen::MatrixXd::Identity(n, n) / (kUsual * kUsual), sign}};
+  } else {
+    entry.priors = priors_of(deviation, sign);
   }
   return entry;
 }
 
 Entry entry_of(const CurveOver& over, int first_column, double weight_N) {
   Entry entry;
-  const char axis = "xyz"[over.axis], number = "123"[over.axis];
-  entry.name = fmt::format("force_{}{} over {}", over.is_in_body ? "b" : "", over.is_in_body ? number : axis,
-                           identification::scan_variable(over.variable).name);
+  const std::string variable = identification::scan_variable(over.variable).name;
+  switch (over.frame) {
+    case Frame::kWorld:
+      entry.name = fmt::format("force_{} over {}", "xyz"[over.axis], variable);
+      break;
+    case Frame::kBody:
+      entry.name = fmt::format("force_b{} over {}", over.axis + 1, variable);
+      break;
+    case Frame::kVelocity:
+      entry.name = kDragCurve;
+      break;
+  }
   entry.kind = Kind::kCurve;
+  entry.variable = variable;
   entry.size = Curve::kSize;
   entry.first_column = {first_column};
+  constexpr double kLevel = 0.05;  // precision of a constant, relative to that of bends
+  const Eigen::VectorXd zero = Eigen::VectorXd::Zero(entry.size);
+  const Eigen::MatrixXd level = kLevel * Eigen::MatrixXd::Identity(entry.size, entry.size);
   for (const double deviation : {0.2 * kUsual, kUsual}) {
-    for (const double smoothness : {1.0, 100.0}) entry.scales.push_back({deviation * weight_N, smoothness});
+    for (const double smoothness : {1.0, 100.0})
+      entry.priors.push_back(
+          {zero, (level + smoothness * Curve::roughness()) / std::pow(deviation * weight_N, 2), zero});
   }
   return entry;
 }
@@ -118,24 +163,14 @@ void over_placed_tracks(const identification::Passes& passes, const Survey& surv
 
 }  // namespace
 
-Prior Hypotheses::prior_of(const Item& item) const {
-  const Entry& entry = entries[item.entry];
-  if (entry.kind == Kind::kEffect)
-    return {entry.mean, Eigen::MatrixXd(entry.deviation.cwiseAbs2().cwiseInverse().asDiagonal()), entry.sign};
-  constexpr double kLevel = 0.05;  // precision of a constant, relative to that of bends
-  const auto [deviation, smoothness] = entry.scales[item.scale];
-  const Eigen::MatrixXd precision =
-      (kLevel * Eigen::MatrixXd::Identity(entry.size, entry.size) + smoothness * Curve::roughness()) /
-      (deviation * deviation);
-  return {Eigen::VectorXd::Zero(entry.size), precision, Eigen::VectorXd::Zero(entry.size)};
-}
+const Prior& Hypotheses::prior_of(const Item& item) const { return entries[item.entry].priors[item.prior]; }
 
 double Hypotheses::log_prior(const Item& item) const {
   const Entry& entry = entries[item.entry];
   const auto alike = std::count_if(entries.begin(), entries.end(),
                                    [&](const Entry& other) { return other.kind == entry.kind; });
-  return -std::log(2.0 * static_cast<double>(alike)) -
-         std::log(static_cast<double>(entry.shapes * entry.scales.size()));
+  return -entry.doubt - std::log(2.0 * static_cast<double>(alike)) -
+         std::log(static_cast<double>(entry.shapes * entry.priors.size()));
 }
 
 Hypotheses hypotheses(const identification::Passes& passes,
@@ -152,7 +187,7 @@ Hypotheses hypotheses(const identification::Passes& passes,
     result.columns[axis].setZero(spectral.rows(), width);
     result.residual_N[axis].setZero(spectral.rows());
   }
-  Instruments instruments(spectral, width);
+  Instruments instruments(spectral, width, surveyed.vehicles);
   Energy energy(width);
   std::mutex mutex;
   over_placed_tracks(

@@ -17,16 +17,8 @@ enum class Kind {
   kCurve  ///< a free curve over a variable, along one axis
 };
 
-/// A named effect or a free curve. Both are explanations of the same kind.
-struct Entry {
-  std::string name;  ///< of the effect, or "force_z over z"
-  Kind kind = Kind::kEffect;
-  int size = 1;                               ///< columns
-  std::vector<int> first_column;              ///< by shape
-  std::size_t shapes = 1;                     ///< of the grid; later ones are off it
-  std::vector<std::array<double, 2>> scales;  ///< of a curve: standard deviation in newton and smoothness
-  Eigen::VectorXd mean, deviation, sign;      ///< of the coefficients, except of a curve; see Prior
-};
+/// The name of the free curve along the velocity over the speed.
+inline constexpr char kDragCurve[] = "drag over speed";
 
 /// A normal distribution of coefficients.
 struct Prior {
@@ -35,11 +27,23 @@ struct Prior {
   Eigen::VectorXd sign;  ///< +1 or -1: only coefficients of this sign; 0: all
 };
 
-/// An explanation with one of its shapes and one of its scales.
+/// A named effect or a free curve. Both are explanations of the same kind.
+struct Entry {
+  std::string name;  ///< of the effect, or "force_z over z"
+  Kind kind = Kind::kEffect;
+  std::string variable;           ///< of a curve
+  double doubt = 0;               ///< ln of odds against it, before any flight
+  int size = 1;                   ///< columns
+  std::vector<int> first_column;  ///< by shape
+  std::size_t shapes = 1;         ///< of the grid; later ones are off it
+  std::vector<Prior> priors;      ///< equally likely
+};
+
+/// An explanation with one of its shapes and one of its priors.
 struct Item {
-  std::size_t entry = 0, shape = 0, scale = 0;
+  std::size_t entry = 0, shape = 0, prior = 0;
   bool operator==(const Item& other) const {
-    return entry == other.entry && shape == other.shape && scale == other.scale;
+    return entry == other.entry && shape == other.shape && prior == other.prior;
   }
 };
 
@@ -59,9 +63,10 @@ struct Hypotheses {
   /// By axis, [rows x instruments]; empty if a log has no set points.
   std::array<Eigen::MatrixXf, 3> instruments;
 
-  Prior prior_of(const Item& item) const;
+  const Prior& prior_of(const Item& item) const;
   /// Returns ln of the share of the prior probability that falls to an item: half to effects and half to curves,
-  /// equally to their entries, equally to their shapes and scales.
+  /// equally to their entries, equally to their shapes and priors. An effect that varies is 128 times less likely than
+  /// its plain form: it is named where flights show that it varies.
   double log_prior(const Item& item) const;
 };
 

@@ -52,8 +52,10 @@ Eigen::MatrixXf mixtures(const Eigen::MatrixXf& columns) {
 
 }  // namespace
 
-Instruments::Instruments(const Spectral& spectral, Eigen::Index columns)
-    : spectral_(spectral), commanded_(Eigen::MatrixXf::Zero(spectral.rows(), 1 + 9 * (kLags + 1) + 3)) {
+Instruments::Instruments(const Spectral& spectral, Eigen::Index columns, std::vector<std::string> vehicles)
+    : spectral_(spectral), vehicles_(std::move(vehicles)) {
+  const auto constants = static_cast<Eigen::Index>(vehicles_.size());
+  commanded_.setZero(spectral.rows(), constants + 9 * (kLags + 1) + 3);
   for (Eigen::MatrixXf& axis : wanted_) axis.setZero(spectral.rows(), columns);
 }
 
@@ -76,8 +78,9 @@ void Instruments::add(const identification::ModelledTrack& modelled, const std::
         if (!wanted[axis].col(c).isZero())
           put(wanted[axis].col(c).segment(stretch.first, stretch.count), wanted_[axis], c);
     }
-    Eigen::Index column = 0;
-    put(Eigen::VectorXf::Ones(stretch.count), commanded_, column++);
+    const auto vehicle = std::find(vehicles_.begin(), vehicles_.end(), track.vehicle) - vehicles_.begin();
+    put(Eigen::VectorXf::Ones(stretch.count), commanded_, vehicle);
+    auto column = static_cast<Eigen::Index>(vehicles_.size());
     for (Eigen::Index signal = 0; signal < commanded.cols(); ++signal) {
       const Eigen::VectorXf series = commanded.col(signal).segment(stretch.first, stretch.count);
       for (int lag = 0; lag < kLags; ++lag)

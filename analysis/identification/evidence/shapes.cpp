@@ -142,7 +142,7 @@ Set moved(const identification::Passes& passes, const Projection& projection, co
 
 Weighed with_free_shapes(const identification::Passes& passes, const Projection& projection, Hypotheses& all,
                          Whitened& data, Weighed best) {
-  constexpr int kMostSteps = 3;
+  constexpr int kMostSteps = 6;
   constexpr double kLeast = 0.05;  // nats
   const std::vector<Free> free = free_shapes(all, best.set);
   for (int step = 0; step < kMostSteps && !free.empty(); ++step) {
