@@ -12,10 +12,7 @@
 namespace swarmcert::tests {
 namespace {
 
-logs::RawLog ulog_of(const std::string& bytes) {
-  std::istringstream in(bytes);
-  return logs::read_ulog(in, "flight.ulg");
-}
+logs::RawLog ulog_of(std::string bytes) { return logs::read_ulog(bytes, "flight.ulg"); }
 
 /// Returns the numbers of the topic "count" that were read.
 std::vector<double> counts_in_ulog(const logs::RawLog& log) { return values_in(log, "count", "number"); }
