@@ -150,6 +150,9 @@ TEST(FileMeaning, ObjectsBesideTheStateDictArePassedOverAndOtherTypesRefused) {
       parse_weights(checkpoint(global_op("pathlib", "PosixPath") + text_op("runs") + "\x85R"), "net.pth")
           .layers.size(),
       2u);
+  const std::string counts = "}(" + text_op("milestones") + integer_op(3) + "u\x85R";
+  EXPECT_EQ(parse_weights(checkpoint(global_op("collections", "Counter") + counts), "net.pth").layers.size(),
+            2u);
   const std::string generator = "\x8a\x10" + std::string(16, '\1');  // 128 bits of a random generator
   EXPECT_EQ(parse_weights(checkpoint(generator), "net.pth").layers.size(), 2u);
   EXPECT_TRUE(refuses(
