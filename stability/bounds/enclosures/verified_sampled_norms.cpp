@@ -28,9 +28,8 @@ struct Linear {
   explicit Linear(const IntervalVector& c) {
     double radius = 0;
     for (const Interval& x : c) {
-      mid.push_back(x.lower + (x.upper - x.lower) / 2);
-      const double r = up(std::max(x.upper - mid.back(), mid.back() - x.lower));
-      radius = up(radius + r);
+      mid.push_back(middle(x));
+      radius = up(radius + farthest(x, mid.back()));
     }
     per_error = norm_above(c) * kOver;
     // gamma_n of a dot product, plus the same amount for the few operations on its result.
@@ -115,18 +114,15 @@ class SampledEnclosure {
     const std::size_t n = model.size();
     A_.resize(n * n);
     Interval radius;
-    Interval size;
     for (std::size_t i = 0; i < n; ++i) {
       for (std::size_t j = 0; j < n; ++j) {
         const Interval a = system_.A(i, j);
-        const double mid = a.lower + (a.upper - a.lower) / 2;
-        A_[j * n + i] = mid;
-        const double r = up(std::max(a.upper - mid, mid - a.lower));
+        A_[j * n + i] = middle(a);
+        const double r = farthest(a, middle(a));
         radius += Interval(r) * r;
-        size += Interval(a.mag()) * a.mag();
       }
     }
-    step_error_ = (sqrt(radius).upper + 2.3e-16 * static_cast<double>(n + 2) * sqrt(size).upper) * kOver;
+    step_error_ = (sqrt(radius).upper + 2.3e-16 * static_cast<double>(n + 2) * norm_above(system_.A)) * kOver;
     gap_ = Interval(1) - Interval(system_.gamma);
     IntervalVector k0(n);
     IntervalVector k1(n);
@@ -163,10 +159,10 @@ class SampledEnclosure {
     std::vector<double> next(n);
     double error = 0;
     for (std::size_t i = 0; i < n; ++i) {
-      row[i] = output.row[i].lower + (output.row[i].upper - output.row[i].lower) / 2;
+      row[i] = middle(output.row[i]);
       error = up(error + up(output.row[i].upper - output.row[i].lower));
     }
-    const double settled = (output.settled.lower + output.settled.upper) / 2;
+    const double settled = middle(output.settled);
     const double settled_error =
         up(output.settled.upper - output.settled.lower) + 1e-15 * output.settled.mag();
     Runs of_S;
@@ -233,7 +229,7 @@ class SampledEnclosure {
     Eigen::VectorXd right(static_cast<Index>(n));
     for (std::size_t i = 0; i < n; ++i) {
       for (std::size_t j = 0; j < n; ++j) left(static_cast<Index>(i), static_cast<Index>(j)) -= A_[j * n + i];
-      right[static_cast<Index>(i)] = (c[i].lower + c[i].upper) / 2;
+      right[static_cast<Index>(i)] = middle(c[i]);
     }
     const Eigen::VectorXd solved = left.fullPivLu().solve(right);
     IntervalVector residual = c;
@@ -342,9 +338,6 @@ class SampledEnclosure {
   Linear k0_, k1_, rest_, second_rest_;
 };
 
-constexpr std::array<Interval VerifiedNorms::*, 4> kSampledGains = {
-    &VerifiedNorms::rate, &VerifiedNorms::amplitude, &VerifiedNorms::edge, &VerifiedNorms::impulse};
-
 Interval dot(const IntervalVector& row, const IntervalVector& column) {
   Interval total;
   for (std::size_t i = 0; i < row.size(); ++i) total += row[i] * column[i];
@@ -369,7 +362,7 @@ std::optional<VerifiedSampledNorms> enclosed_norms(const SampledLoop& loop, cons
     const double phase_s = loop.period_s * i / kVerifiedPhases;
     const VerifiedNorms here = output(model.error_at(phase_s), phase_s, at_rest);
     if (i == 0) result.at_samples = result.all_times = here;
-    for (const auto gain : kSampledGains) {
+    for (const auto gain : kVerifiedGains) {
       Interval& all = result.all_times.*gain;
       all = {std::max(all.lower, (here.*gain).lower), std::max(all.upper, (here.*gain).upper)};
     }
@@ -381,7 +374,7 @@ std::optional<VerifiedSampledNorms> enclosed_norms(const SampledLoop& loop, cons
     IntervalVector after(model.size() + 1);
     after[i < model.lags() ? 2 + i : model.command_index()] = 1;
     const VerifiedNorms here = output(after, 0, Interval(0));
-    for (const auto gain : kSampledGains)
+    for (const auto gain : kVerifiedGains)
       (bend.*gain).upper = std::max((bend.*gain).upper, (here.*gain).upper);
   }
   if (is_force) {
@@ -391,7 +384,7 @@ std::optional<VerifiedSampledNorms> enclosed_norms(const SampledLoop& loop, cons
   }
   bend.edge = bend.amplitude;  // an input of total variation 1 from rest stays below 1
   const double step_s = up(loop.period_s / kVerifiedPhases * (1 + 1e-15));
-  for (const auto gain : kSampledGains) {
+  for (const auto gain : kVerifiedGains) {
     Interval& all = result.all_times.*gain;
     if (std::isfinite(all.upper))
       all.upper = (Interval(all.upper) + Interval(step_s) * step_s / Interval(8) * (bend.*gain).upper).upper;
@@ -402,7 +395,7 @@ std::optional<VerifiedSampledNorms> enclosed_norms(const SampledLoop& loop, cons
 /// Divides every finite gain by `divisor`.
 VerifiedSampledNorms over(VerifiedSampledNorms result, Interval divisor) {
   for (VerifiedNorms* const norms : {&result.at_samples, &result.all_times}) {
-    for (const auto gain : kSampledGains) {
+    for (const auto gain : kVerifiedGains) {
       if (std::isfinite((norms->*gain).upper)) norms->*gain = norms->*gain / divisor;
     }
   }
