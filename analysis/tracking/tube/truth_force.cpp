@@ -31,16 +31,6 @@ Interval power(Interval x, double p) {
           pow(Interval(std::max(x.upper, kTiny)), p).upper};
 }
 
-double value_of(const stability::EffectSpec& spec, const char* name) {
-  const stability::EffectInfo& info = stability::effect_info(spec.name);
-  const stability::EffectValues values = effect_values(info, spec);
-  for (std::size_t i = 0; i < info.linear.size(); ++i)
-    if (info.linear[i].name == name) return values.linear[i];
-  for (std::size_t i = 0; i < info.shape.size(); ++i)
-    if (info.shape[i].name == name) return values.shape[i];
-  throw std::logic_error(std::string("no parameter ") + name);
-}
-
 /// Enclosure of a field and its gradient on a set.
 struct Strength {
   Interval g;
@@ -89,20 +79,20 @@ TruthForce::TruthForce(const stability::Model& truth, double largest_thrust_N)
     };
     const bool for_some_only = !effect.vehicle.empty();
     if (!effect.is_expression() && effect.name == "downwash") {
-      if (value_of(effect, "tail") != 0 || value_of(effect, "convection_s_m") != 0) {
+      if (effect_value(effect, "tail") != 0 || effect_value(effect, "convection_s_m") != 0) {
         refuse("has a tail or is carried along by the air, for which there is no enclosure over a tube");
       }
-      downwash_.push_back({value_of(effect, "amplitude_N"), value_of(effect, "decay_exponent"),
-                           value_of(effect, "spread_m"), value_of(effect, "spread_slope"),
-                           value_of(effect, "norm_exponent"),
+      downwash_.push_back({effect_value(effect, "amplitude_N"), effect_value(effect, "decay_exponent"),
+                           effect_value(effect, "spread_m"), effect_value(effect, "spread_slope"),
+                           effect_value(effect, "norm_exponent"),
                            pow(Interval(truth.mass_kg) / Interval(stability::kWakeReferenceMass_kg),
-                               value_of(effect, "mass_exponent")),
+                               effect_value(effect, "mass_exponent")),
                            for_some_only});
     } else if (!effect.is_expression() && effect.name == "upper_lift") {
-      lift_.push_back({value_of(effect, "amplitude_N"), value_of(effect, "decay_exponent"),
-                       value_of(effect, "spread_m"), for_some_only});
+      lift_.push_back({effect_value(effect, "amplitude_N"), effect_value(effect, "decay_exponent"),
+                       effect_value(effect, "spread_m"), for_some_only});
     } else if (effect.name == "motor_lag") {
-      motor_lag_s_ = value_of(effect, "tau_s");
+      motor_lag_s_ = effect_value(effect, "tau_s");
     } else if (effect.name == "thrust_ratio" || effect.name == "delay") {
       refuse("acts through the loop, which a tube does not model");
     } else {
@@ -217,11 +207,11 @@ std::array<Interval, 3> TruthForce::rest_N(Interval height_m,
   for (const stability::EffectSpec& effect : others_) {
     if (effect.name == "constant_force" && effect.vehicle.empty()) {
       const char* const names[] = {"force_x_N", "force_y_N", "force_z_N"};
-      for (std::size_t k = 0; k < 3; ++k) force_N[k] += Interval(value_of(effect, names[k]));
+      for (std::size_t k = 0; k < 3; ++k) force_N[k] += Interval(effect_value(effect, names[k]));
       continue;
     }
     if (effect.name == "drag_linear" && effect.vehicle.empty()) {
-      const Interval drag(value_of(effect, "drag_N_s_m"));
+      const Interval drag(effect_value(effect, "drag_N_s_m"));
       for (std::size_t k = 0; k < 3; ++k) force_N[k] += -(drag * velocity_m_s[k]);
       continue;
     }

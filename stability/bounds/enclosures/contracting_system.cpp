@@ -115,11 +115,6 @@ void scale_time(double scale, ContractingSystem& system) {
 
 }  // namespace
 
-std::optional<ContractingSystem> contracting(const TransferFunction& h) {
-  return contracting(IntervalVector(h.numerator.begin(), h.numerator.end()),
-                     IntervalVector(h.denominator.begin(), h.denominator.end()));
-}
-
 std::optional<ContractingSystem> contracting(const IntervalVector& numerator,
                                              const IntervalVector& denominator) {
   const std::size_t n = denominator.size() - 1;

@@ -26,13 +26,6 @@ Interval KernelCells::whole_net(std::size_t k) const {
   return result;
 }
 
-std::optional<KernelCells> kernel_cells(const TransferFunction& y, double cell_s, int count) {
-  if (y.delay_s > 0) return std::nullopt;
-  const Polynomial denominator = sum(y.denominator, y.feedback);
-  return kernel_cells(IntervalVector(y.numerator.begin(), y.numerator.end()),
-                      IntervalVector(denominator.begin(), denominator.end()), cell_s, count);
-}
-
 std::optional<KernelCells> kernel_cells(const IntervalVector& numerator, const IntervalVector& denominator,
                                         double cell_s, int count) {
   const std::optional<ContractingSystem> system = contracting(numerator, denominator);

@@ -181,7 +181,8 @@ class SampledEnclosure {
       if (least > cell.k_error) {
         of_S.add(cell.k0 > 0 ? 1 : -1, [&] { return cell.S(0); });
       } else {
-        split_k(cell, 0, h_, kDepth, of_S);
+        follow([&](double a, double b) { return hull(cell.k(a), cell.k(b)); },
+               [&](double a) { return cell.S(a); }, cell.k_error, 0, h_, kDepth, of_S);
       }
       if (integrates_) add_second(cell, most, of_Q);
       advance(row, next, length, error);
@@ -269,19 +270,19 @@ class SampledEnclosure {
     cell.Q_error = (off(second_rest_) + h_ * cell.S_error) * kOver;
   }
 
-  void split_k(const Cell& cell, double a, double b, int depth, Runs& runs) const {
-    const Interval range = hull(cell.k(a), cell.k(b));
-    if (range.lower > 0 || range.upper < 0) {
-      runs.add(range.lower > 0 ? 1 : -1, [&] { return cell.S(a); });
-      return;
-    }
-    if (depth == 0 || 8 * cell.k_error > range.mag()) {
-      runs.add_unsure(cell.S(a), up(up(b - a) * range.mag()));
-      return;
-    }
+  /// Adds the runs of one sign of a function on [a, b], halved where its sign is not sure.
+  /// @param range_on encloses the function on an interval. @param integral_at its antiderivative
+  template <class RangeOn, class IntegralAt>
+  static void follow(const RangeOn& range_on, const IntegralAt& integral_at, double error, double a, double b,
+                     int depth, Runs& runs) {
+    const Interval range = range_on(a, b);
+    if (range.lower > 0 || range.upper < 0)
+      return runs.add(range.lower > 0 ? 1 : -1, [&] { return integral_at(a); });
+    if (depth == 0 || 8 * error > range.mag())
+      return runs.add_unsure(integral_at(a), up(up(b - a) * range.mag()));
     const double middle = a + (b - a) / 2;
-    split_k(cell, a, middle, depth - 1, runs);
-    split_k(cell, middle, b, depth - 1, runs);
+    follow(range_on, integral_at, error, a, middle, depth - 1, runs);
+    follow(range_on, integral_at, error, middle, b, depth - 1, runs);
   }
 
   void add_second(const Cell& cell, double k_most, Runs& runs) const {
@@ -297,23 +298,13 @@ class SampledEnclosure {
     if (std::abs(cell.S0) > (h_ * (k_most + cell.k_error) + cell.S_error) * kOver) {
       runs.add(cell.S0 > 0 ? 1 : -1, [&] { return cell.Q(0); });
     } else {
-      split_S(cell, 0, h_, kDepth, runs);
+      const auto range_on = [&](double a, double b) {
+        const double middle = a + (b - a) / 2;
+        return cell.S(middle) + hull(cell.k(a), cell.k(b)) * (Interval(a, b) - Interval(middle));
+      };
+      follow(
+          range_on, [&](double a) { return cell.Q(a); }, cell.S_error, 0, h_, kDepth, runs);
     }
-  }
-
-  void split_S(const Cell& cell, double a, double b, int depth, Runs& runs) const {
-    const double middle = a + (b - a) / 2;
-    const Interval range = cell.S(middle) + hull(cell.k(a), cell.k(b)) * (Interval(a, b) - Interval(middle));
-    if (range.lower > 0 || range.upper < 0) {
-      runs.add(range.lower > 0 ? 1 : -1, [&] { return cell.Q(a); });
-      return;
-    }
-    if (depth == 0 || 8 * cell.S_error > range.mag()) {
-      runs.add_unsure(cell.Q(a), up(up(b - a) * range.mag()));
-      return;
-    }
-    split_S(cell, a, middle, depth - 1, runs);
-    split_S(cell, middle, b, depth - 1, runs);
   }
 
   void advance(const std::vector<double>& row, std::vector<double>& next, double length,
