@@ -69,6 +69,14 @@ Strength below_a_vehicle(const Offset& dp, double decay, double spread_m, double
   return result;
 }
 
+/// Cutting off a wake changes the sum by at most its own strength there.
+void add_cut_off(double amplitude_N, double decay, TruthForce::Wake& sum) {
+  const Interval nearest = Interval(stability::kWakeReference_m) / Interval(stability::kWakeNearest_m);
+  const double cut_off_N = up(amplitude_N * kCutOff * pow(nearest, decay).upper * 1.001);
+  sum.cut_off_N = up(sum.cut_off_N + cut_off_N);
+  sum.value_N += Interval(-cut_off_N, cut_off_N);
+}
+
 }  // namespace
 
 TruthForce::TruthForce(const stability::Model& truth, double largest_thrust_N)
@@ -132,13 +140,8 @@ void TruthForce::add(const Downwash& field, const std::vector<Offset>& neighbour
   Interval force = -(A * total);
   if (field.for_some_only) force = hull(force, Interval(0));
   sum.value_N += force;
-  // Cutting off a wake changes the sum by at most its own strength there.
-  const double cut_off =
-      up(field.amplitude_N * field.mass_factor.upper * kCutOff *
-         pow(Interval(stability::kWakeReference_m) / Interval(stability::kWakeNearest_m), field.decay).upper *
-         static_cast<double>(neighbours.size()) * 1.001);
-  sum.cut_off_N = up(sum.cut_off_N + cut_off);
-  sum.value_N += Interval(-cut_off, cut_off);
+  const auto wakes = static_cast<double>(neighbours.size());
+  add_cut_off(field.amplitude_N * field.mass_factor.upper * wakes, field.decay, sum);
   for (std::size_t j = 0; j < each.size(); ++j) {
     if (each[j].g.upper <= 0) continue;
     // d total / d g_j = (g_j / total)^(p - 1), which lies between 0 and 1.
@@ -172,12 +175,7 @@ void TruthForce::add(const Lift& field, const std::vector<Offset>& neighbours, W
     if (may_vanish) force = hull(force, Interval(0));
     if (z.lower <= stability::kWakeTouching_m && field.amplitude_N > 0) sum.has_gradient = false;
     sum.value_N += force;
-    const double cut_off = up(
-        field.amplitude_N * kCutOff *
-        pow(Interval(stability::kWakeReference_m) / Interval(stability::kWakeNearest_m), field.decay).upper *
-        1.001);
-    sum.cut_off_N = up(sum.cut_off_N + cut_off);
-    sum.value_N += Interval(-cut_off, cut_off);
+    add_cut_off(field.amplitude_N, field.decay, sum);
     Offset& gradient = sum.gradient_N_m[j];
     for (std::size_t k = 0; k < 2; ++k) gradient[k] += -(force * neighbours[j][k] / ss);
     // h equals z beyond 0.12 m, and z = -dp_z: the force increases with dp_z.
