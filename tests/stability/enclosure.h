@@ -28,7 +28,7 @@ inline testing::AssertionResult encloses(const Interval& interval, double value,
 /// The cells of one response without a delay.
 inline std::optional<stability::KernelCells> cells_of(const stability::TransferFunction& y, double cell_s,
                                                       int count) {
-  const stability::Polynomial denominator = sum(y.denominator, y.feedback);
+  const stability::Polynomial denominator = stability::sum(y.denominator, y.feedback);
   return stability::kernel_cells({y.numerator.begin(), y.numerator.end()},
                                  {denominator.begin(), denominator.end()}, cell_s, count);
 }

@@ -412,17 +412,21 @@ std::vector<NamedClass> classes_up_to(double amplitude_N, double period_s, files
   return {{"amplitude", within}, {"ramps", ramps}, {"edges", edges}, {"passes", passes}};
 }
 
-/// Reports the attacks of every class; a third of the totals of each must be attained to 80 %, so that not exceeding
-/// them says something.
+/// Reports the attacks: of all totals a third must be attained to 80 %, and of those of each class a fifth, so that not
+/// exceeding them says something.
 void expect_none_exceeded(const std::map<std::string, Attacks>& by_class) {
+  int runs = 0, close = 0;
   for (const auto& [name, attacks] : by_class) {
     testing::Test::RecordProperty(name + "_runs", attacks.runs);
     testing::Test::RecordProperty(name + "_attained_80_percent", attacks.close);
-    EXPECT_GE(attacks.runs, 30) << name;
+    testing::Test::RecordProperty(name + "_closest_percent", static_cast<int>(100 * attacks.closest));
+    EXPECT_GE(attacks.runs, 30) << name << ": " << attacks.excluded << " without a proof";
     EXPECT_EQ(attacks.exceeded, 0) << name << ": closest " << attacks.closest;
-    EXPECT_GE(3 * attacks.close, attacks.runs)
-        << name << ": " << attacks.runs << " runs, " << attacks.excluded << " without a proof";
+    EXPECT_GE(5 * attacks.close, attacks.runs) << name << ": " << attacks.close << " of " << attacks.runs;
+    runs += attacks.runs;
+    close += attacks.close;
   }
+  EXPECT_GE(3 * close, runs);
 }
 
 TEST(FlownLoop, NoAttackOnTheNonlinearVehicleExceedsATotalWhoseConditionIsProved) {
@@ -470,8 +474,8 @@ TEST(FlownLoop, NorDoesOneOnTheVehicleWithItsAttitudeLoopInPlaceOfALagThatContai
     loop.gains.attitude_lag_s = *lag_s;
     if (loop.is_stable() != true) continue;
     Attacker<FullVehicle> attacker(loop, loop);
-    // Forces that cause tilts of a few degrees.
-    for (const auto& [name, known] : classes_up_to(4e-4 + 2.6e-3 * random.uniform(), 0.01, random)) {
+    // Forces that cause tilts of a degree.
+    for (const auto& [name, known] : classes_up_to(1e-4 + 6e-4 * random.uniform(), 0.01, random)) {
       const Saturation thrust = saturation(loop, declared(known), {});
       if (thrust.is_proved())
         attacker.attack(known, Channel::kForce, thrust.beyond_linear_N(), attacks[name]);

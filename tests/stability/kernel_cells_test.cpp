@@ -8,6 +8,7 @@
 #include "nn/base/random.h"
 #include "stability/bounds/enclosures/verified_norms.h"
 #include "stability/bounds/loops/axis_loop.h"
+#include "stability/enclosure.h"
 
 namespace swarmcert::stability {
 namespace {

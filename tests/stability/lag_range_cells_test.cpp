@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "nn/base/random.h"
+#include "stability/enclosure.h"
 
 namespace swarmcert::stability {
 namespace {
