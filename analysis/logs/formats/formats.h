@@ -39,8 +39,8 @@ inline constexpr std::size_t kFormatHead_bytes = 4096;
 /// Returns the first kFormatHead_bytes of a stream and rewinds it.
 std::string format_head(std::istream& in);
 
-/// Returns the first kFormatHead_bytes of a file; nothing if it cannot be read, or is a pipe, which blocks whoever opens
-/// it until somebody writes to it.
+/// Returns the first kFormatHead_bytes of a file; nothing if it cannot be read, or is a pipe, which blocks whoever
+/// opens it until somebody writes to it.
 std::string head_of_file(const std::string& path);
 
 /// Opens a log file.
