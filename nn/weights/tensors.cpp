@@ -44,6 +44,17 @@ std::vector<std::string> layers_in(const std::vector<DeclaredTensor>& tensors) {
   return layers;
 }
 
+/// The hint for a tensor that is of no layer: a selection of layers or of modules leaves it out.
+std::string ways_to_leave_out(const std::vector<std::string>& layers) {
+  std::vector<std::string> modules = modules_of(layers);
+  if (modules.front().empty()) modules = layers;
+  if (modules.empty() || modules.front().empty()) return kOnlyLinear;
+  std::string list;
+  for (const std::string& module : modules) list += (list.empty() ? "" : ", ") + module;
+  return "name the network to certify, which leaves this out, with --select and one of " + list +
+         "; or several in the order of evaluation: --select A,B";
+}
+
 class Assembler {
  public:
   Assembler(const std::vector<DeclaredTensor>& tensors, const TensorReader& read, const std::string& path,
@@ -166,15 +177,8 @@ class Assembler {
     std::string layer;
     if (is_part(i, "weight", layer)) return;
     if (!is_part(i, "bias", layer)) {
-      const std::vector<std::string> modules = modules_of(layers_in(tensors_));
-      std::string options;
-      for (const std::string& module : modules)
-        options += (options.empty() ? "--select " : " or --select ") + module;
       refuse(i, shape_text(tensors_[i].shape), "is neither the weight nor the bias of a linear layer",
-             options.empty() || modules.front().empty()
-                 ? kOnlyLinear
-                 : "name the network to certify, which leaves this out: " + options +
-                       "; for a chain of several in the order of evaluation --select A,B");
+             ways_to_leave_out(layers_in(tensors_)));
     }
     LayerParts* owner = nullptr;
     for (LayerParts& parts : parts_)

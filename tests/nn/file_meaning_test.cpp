@@ -121,11 +121,16 @@ TEST(FileMeaning, DeviationsAreKnownByAWordOfTheirName) {
         << name;
 }
 
-TEST(FileMeaning, ATensorOfNoLayerPointsToTheNetworksThatLeaveItOut) {
-  EXPECT_TRUE(refuses([] { parse_weights(policy_with("action_scale"), "net.pth"); },
-                      {"action_scale", "--select actor or --select critic"}));
-  EXPECT_EQ(parse_weights(policy_with("action_scale"), "net.pth", "", {"actor.0", "actor.2"}).layers.size(),
-            2u);
+TEST(FileMeaning, ATensorOfNoLayerPointsToWhatLeavesItOut) {
+  const std::string policy = policy_with("action_scale");
+  EXPECT_TRUE(refuses([&] { parse_weights(policy, "net.pth"); },
+                      {"action_scale", "--select and one of actor, critic"}));
+  EXPECT_EQ(names_of(parse_weights(policy, "net.pth", "", {"actor.0", "actor.2"})), "actor.0,actor.2");
+  const std::string flat =
+      state_dict_of({{"fc1", 3, 2}, {"fc_mean", 1, 3}, {"fc_logstd", 1, 3}},
+                    {{"action_scale", "s", 1, {1, 1}, {1, 1}}}, {{"s", raw_numbers<float>({1})}});
+  EXPECT_TRUE(refuses([&] { parse_weights(flat, "net.pth"); }, {"action_scale", "fc1, fc_mean, fc_logstd"}));
+  EXPECT_EQ(names_of(parse_weights(flat, "net.pth", "", selected({"fc1", "fc_mean"}))), "fc1,fc_mean");
 }
 
 TEST(FileMeaning, AnStdBesideAMeanIsNoDeviation) {
