@@ -9,8 +9,8 @@ let texts where ~size json =
   require (List.length values = size) "%s: needs one number per output" where;
   values
 
-(* What is stated of a layer or a sum: intervals, and errors for sums in any order and in order ([] where nothing is said
-   of float32). *)
+(* What is stated of a layer or a sum: intervals, and errors by whether sums are in order ([] where nothing is said of
+   float32). *)
 let stated where ~size ~with_error json =
   require_keys where [ "lower"; "upper"; "error"; "error_in_order" ] json;
   let lower = texts where ~size (find where "lower" json) in
@@ -206,7 +206,8 @@ let check (state : Claims.t) entry =
        let p = Functions.index state.net name in
        let box, errors = input state where name entry in
        let hidden, (last, last_error) = bounds name in
-       prove_network state (where ^ ": " ^ name) p ~box ~errors ~with_error ~norm:(fun ordered -> sum_of (last_error ordered))
+       prove_network state (where ^ ": " ^ name) p ~box ~errors ~with_error
+         ~norm:(fun ordered -> sum_of (last_error ordered))
          (hidden, (last, last_error));
        let fewest, most = if name = "phi:ground" then 1, 1 else 0, count in
        { Proved.phi = p; inputs_in = box; fewest = Z.of_int fewest; most = Z.of_int most }, errors, last in

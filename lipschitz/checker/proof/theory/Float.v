@@ -26,7 +26,8 @@ Definition rounds_closely (exact v : R) : Prop := rounds exact v /\
 (** v is what becomes of a where the summands are added to it one after the other, each rounded by itself or fused. *)
 Inductive added_in_order : R -> list R -> R -> Prop :=
 | none_left a : added_in_order a [] a
-| rounded_next a s l p b v : rounds_closely s p -> rounds_closely (a + p) b -> added_in_order b l v -> added_in_order a (s :: l) v
+| rounded_next a s l p b v : rounds_closely s p -> rounds_closely (a + p) b -> added_in_order b l v ->
+    added_in_order a (s :: l) v
 | fused_next a s l b v : rounds_closely (s + a) b -> added_in_order b l v -> added_in_order a (s :: l) v.
 (** `in_order`: each sum starts with the bias, and the products follow from the first input to the last. *)
 Definition float_layer (in_order : bool) (l : matrix * list R) (h v : list R) : Prop :=

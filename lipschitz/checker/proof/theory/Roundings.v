@@ -1,7 +1,7 @@
 (** Accepted bounds on how far a float32 evaluation is from the exact function hold. *)
 From Coq Require Import List ZArith Reals Lra Lia Bool Permutation.
-From Swarmcert Require Import Algebra Activations Form Network Checker Fixed Float Meaning Steepness Sets Distance Blocks
-    Lower Values Enclosures Intervals Centred Claims Slopes Witness Laws Ranges.
+From Swarmcert Require Import Algebra Activations Form Network Checker Fixed Float Meaning Steepness Sets Distance
+    Blocks Lower Values Enclosures Intervals Centred Claims Slopes Witness Laws Ranges.
 Import ListNotations.
 Open Scope R_scope.
 #[local] Arguments Z.add : simpl never.
@@ -68,7 +68,8 @@ Lemma ordered_is_sum a s v : added_in_order a s v -> forall l, float_sum l a -> 
 Proof.
   intros H. induction H as [a|a s l p b v P B H IH|a s l b v B H IH]; intros k K.
   - now rewrite app_nil_r.
-  - replace (k ++ s :: l) with ((k ++ [s]) ++ l) by now rewrite <- app_assoc. apply IH. eapply added; [exact K|apply summand, P|apply B].
+  - replace (k ++ s :: l) with ((k ++ [s]) ++ l) by now rewrite <- app_assoc. apply IH.
+    eapply added; [exact K|apply summand, P|apply B].
   - replace (k ++ s :: l) with ((k ++ [s]) ++ l) by now rewrite <- app_assoc. apply IH.
     apply reordered with (s :: k); [apply Permutation_cons_append|]. apply fused with a; [exact K|apply B].
 Qed.
