@@ -52,7 +52,8 @@ Intervals sum_intervals(const std::vector<SumTerm>& terms, std::size_t size);
 ///
 /// With u = 2^-24, an operation with exact result r returns r (1 + d) + e, |d| <= u, |e| <= 2^-150. In any order, a sum
 /// of n summands whose absolute values add up to m has an error of at most
-/// ((1 + u)^n - 1) m + (2 n - 1) 2^-150 (1 + u)^n (by induction over the additions), which is at most (n u + n^2 u^2) m + n 2^-148 as long as n u <= 1/2. In order,
+///   ((1 + u)^n - 1) m + (2 n - 1) 2^-150 (1 + u)^n
+/// (by induction over the additions), which is at most (n u + n^2 u^2) m + n 2^-148 as long as n u <= 1/2. In order,
 /// each operation is off by at most half the distance between floats below a power of two above its result, which lies
 /// between the ends of the partial sum. `added` grows by the norm of this after the norm of the matrix.
 /// @param norm at least the spectral norm of the layer.
