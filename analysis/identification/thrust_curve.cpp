@@ -60,31 +60,47 @@ double load_rms(const LoadBlocks& blocks, const Eigen::Vector3d& shares) {
   return std::sqrt(squares / static_cast<double>(blocks.load.size()));
 }
 
-/// Several flights, or the parts of a single one.
-std::vector<LoadBlocks> curve_parts(const std::vector<LoadBlocks>& flights) {
-  if (flights.size() != 1) return flights;
-  const std::size_t count = flights[0].load.size();
+/// Returns the fifths of a flight.
+std::vector<LoadBlocks> fifths_of(const LoadBlocks& flight) {
+  const std::size_t count = flight.load.size();
   std::vector<LoadBlocks> parts(kPartsOfFlight);
   for (std::size_t i = 0; i < count; ++i) {
     LoadBlocks& part = parts[i * kPartsOfFlight / count];
-    part.powers.push_back(flights[0].powers[i]);
-    part.load.push_back(flights[0].load[i]);
+    part.powers.push_back(flight.powers[i]);
+    part.load.push_back(flight.load[i]);
   }
   return parts;
 }
 
-/// Returns the errors of each part, of a polynomial fitted to the others.
-std::vector<double> held_out_errors(const std::vector<LoadBlocks>& parts, const Terms& terms) {
+/// Returns the errors of each fifth of each flight, of a polynomial fitted to the other flights; of a single flight, to
+/// its other fifths.
+std::vector<double> held_out_errors(const std::vector<LoadBlocks>& flights, const Terms& terms) {
   std::vector<double> errors;
-  for (std::size_t f = 0; f < parts.size(); ++f)
-    errors.push_back(load_rms(parts[f], fitted_shares(joined_blocks(parts, f), terms)));
+  for (std::size_t f = 0; f < flights.size(); ++f) {
+    const std::vector<LoadBlocks> parts = fifths_of(flights[f]);
+    for (std::size_t k = 0; k < parts.size(); ++k) {
+      const LoadSystem others = flights.size() > 1 ? joined_blocks(flights, f) : joined_blocks(parts, k);
+      errors.push_back(load_rms(parts[k], fitted_shares(others, terms)));
+    }
+  }
   return errors;
 }
 
-double mean_ratio(const std::vector<double>& errors, const std::vector<double>& reference) {
-  double sum = 0;
-  for (std::size_t f = 0; f < errors.size(); ++f) sum += errors[f] / reference[f];
-  return sum / static_cast<double>(errors.size());
+/// The mean of ratios of errors, and its standard error.
+struct ErrorRatio {
+  double mean = 0, deviation = 0;
+  bool is_below(double least) const { return mean <= least && mean + 2 * deviation <= 1; }
+};
+
+ErrorRatio error_ratio(const std::vector<double>& errors, const std::vector<double>& reference) {
+  const auto count = static_cast<double>(errors.size());
+  ErrorRatio ratio;
+  double squares = 0;
+  for (std::size_t k = 0; k < errors.size(); ++k) ratio.mean += errors[k] / reference[k] / count;
+  for (std::size_t k = 0; k < errors.size(); ++k)
+    squares += std::pow(errors[k] / reference[k] - ratio.mean, 2);
+  ratio.deviation = std::sqrt(squares / (count * (count - 1)));
+  return ratio;
 }
 
 /// Whether a + b u + c u^2 is not negative and grows between two commands.
@@ -132,7 +148,6 @@ ThrustCurve thrust_curve(const std::vector<LoadBlocks>& flights, int power) {
     if (flight.load.size() >= kFewestLoadBlocks) usable.push_back(flight);
   }
   if (usable.empty()) return {curve.shares, "too little flight for more terms"};
-  const std::vector<LoadBlocks> parts = curve_parts(usable);
   const LoadSystem all = joined_blocks(usable, usable.size());
   const Terms plain = {power};
   const Eigen::VectorXd off = all.load.array() - all.load.mean();
@@ -143,20 +158,20 @@ ThrustCurve thrust_curve(const std::vector<LoadBlocks>& flights, int power) {
                             100 * std::max(explained, 0.0));
     return curve;
   }
-  const std::vector<double> reference = held_out_errors(parts, plain);
+  const std::vector<double> reference = held_out_errors(usable, plain);
   double best = 1 - kLeastFallOfCurve;
   for (const Terms& terms : {Terms{1, 2}, Terms{0, 1, 2}}) {
-    const double ratio = mean_ratio(held_out_errors(parts, terms), reference);
+    const ErrorRatio ratio = error_ratio(held_out_errors(usable, terms), reference);
     curve.why += fmt::format("{}{} terms: held-out error {:+.1f} %", curve.why.empty() ? "" : ", ",
-                             terms.size(), 100 * (ratio - 1));
+                             terms.size(), 100 * (ratio.mean - 1));
     const Eigen::Vector3d shares = fitted_shares(all, terms);
     double least = 1, most = 1;
     for (Eigen::Index i = 0; i < all.powers.rows(); ++i) {
       least = std::min(least, all.powers(i, 1));
       most = std::max(most, all.powers(i, 1));
     }
-    if (ratio > best || !grows(shares, least, most)) continue;
-    best = ratio - kLeastFallOfCurve;
+    if (!ratio.is_below(best) || !grows(shares, least, most)) continue;
+    best = ratio.mean - kLeastFallOfCurve;
     curve.shares = shares;
   }
   return curve;
