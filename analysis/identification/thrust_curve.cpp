@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "controller/position_law.h"
+#include "stability/model.h"
 
 namespace swarmcert::identification {
 namespace {
@@ -136,7 +136,7 @@ LoadBlocks load_blocks(const logs::Log& log, const std::vector<char>& is_airborn
       const double u = s.motor_command[static_cast<std::size_t>(k)];
       powers += Eigen::Vector3d(1, u, u * u) / motors;
     }
-    load += s.specific_force_m_s2[2] / up / controller::kGravity_m_s2;
+    load += s.specific_force_m_s2[2] / up / stability::kGravity_m_s2;
     ++count;
   }
   return blocks;

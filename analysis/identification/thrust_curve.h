@@ -34,9 +34,9 @@ struct ThrustCurve {
 
 /// Returns the polynomial that replaces the given power of the command. It is found if the error on flights held out in
 /// turn (of a single one, on its fifths) falls by 1 % on average over fifths of flights, and by more than two standard
-/// errors of that mean; if it grows from command 0 to 1, as model files require; and if the power
-/// alone explains nine tenths of the variance of the load: else the commands follow disturbances, and the polynomial
-/// would be that of the controller.
+/// errors of that mean; if it grows from command 0 to 1, as model files require; and if the power alone explains nine
+/// tenths of the variance of the load: else the commands follow disturbances, and the polynomial would be that of the
+/// controller.
 /// @param power 1 or 2
 ThrustCurve thrust_curve(const std::vector<LoadBlocks>& flights, int power);
 
