@@ -2,7 +2,7 @@
 ///
 /// In means over blocks, the load l (specific force along the thrust axis, over g) is regressed on the means over the
 /// rotors of the powers of their commands u:
-///   l = a + b <u> + c <u^2>,
+///   l = a + b mean(u) + c mean(u^2),
 /// so that a rotor gives the force (a + b u + c u^2) m g / rotors. Tried are the power that the log is read with alone,
 /// b u + c u^2, and all three. More terms are taken if they predict flights better that they were not fitted to.
 #pragma once
@@ -17,7 +17,7 @@ namespace swarmcert::identification {
 
 /// Means over blocks of one flight.
 struct LoadBlocks {
-  std::vector<Eigen::Vector3d> powers;  ///< 1, <u>, <u^2>
+  std::vector<Eigen::Vector3d> powers;  ///< 1, mean(u), mean(u^2)
   std::vector<double> load;             ///< over g
 };
 
