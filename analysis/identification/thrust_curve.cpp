@@ -163,8 +163,8 @@ ThrustCurve thrust_curve(const std::vector<LoadBlocks>& flights, int power) {
   double best = 1 - kLeastFallOfCurve;
   for (const Terms& terms : {Terms{1, 2}, Terms{0, 1, 2}}) {
     const ErrorRatio ratio = error_ratio(held_out_errors(usable, terms), reference);
-    curve.why += fmt::format("{}{} terms: held-out error {:+.1f} %", curve.why.empty() ? "" : ", ",
-                             terms.size(), 100 * (ratio.mean - 1));
+    curve.why += fmt::format("{}{} terms: held-out error {:+.1f} % (+-{:.1f})", curve.why.empty() ? "" : ", ",
+                             terms.size(), 100 * (ratio.mean - 1), 100 * ratio.deviation);
     const Eigen::Vector3d shares = fitted_shares(all, terms);
     if (!ratio.is_below(best) || !grows(shares, all.powers.col(1).minCoeff())) continue;
     best = ratio.mean - kLeastFallOfCurve;
