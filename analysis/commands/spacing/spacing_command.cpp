@@ -154,6 +154,8 @@ int run_spacing(const SpacingOptions& options, const CommonOptions& common) {
   if (common.prints_text()) {
     print_spacing(result, described);
     if (!report.empty()) fmt::print("report: {}\n", report);
+    print_next(common, {"simulate", "swap", "--vehicles", "2", "--gains", options.tracking.gains, "--model",
+                        options.tracking.model, "-o", "flights"});
   }
   return kDone;
 }
