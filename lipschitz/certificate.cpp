@@ -293,11 +293,16 @@ struct JoinedBounds {
 };
 
 void describe(Record& record, const JoinedBounds& vector) {
-  const std::vector<double>& error = vector.bounds.error;
+  const auto error = [&vector](check::Summation summation) {
+    const std::vector<double>& errors = vector.bounds.error[summation];
+    return errors.empty() ? std::nullopt : std::optional(joined(errors));
+  };
   record.field("lower", joined(vector.bounds.lower), "");
   record.field("upper", joined(vector.bounds.upper), "");
-  record.field("error", error.empty() ? std::nullopt : std::optional(joined(error)),
-               "Of a float32 evaluation; null: nothing is said of it.");
+  record.field("error", error(check::kAnyOrder),
+               "Of a float32 evaluation that sums in any order; null: nothing is said of it.");
+  record.field("error_in_order", error(check::kInOrder),
+               "Of one that adds to the bias from the first input to the last.");
 }
 
 void describe_number(Record& record, const char* name, const std::optional<double>& number,
@@ -325,7 +330,10 @@ void describe_values(Record& record, const CertifiedValues& values) {
   record.field("lower", hex_floats(values.lower), "Of the outputs.");
   record.field("upper", hex_floats(values.upper), "Of the outputs.");
   describe_number(record, "jump", values.jump, "When a neighbour comes or goes.");
-  describe_number(record, "float32_error", values.float32_error, "Of the float32 evaluation.");
+  describe_number(record, "float32_error", values.float32_error[check::kAnyOrder],
+                  "Of a float32 evaluation that sums in any order.");
+  describe_number(record, "float32_error_in_order", values.float32_error[check::kInOrder],
+                  "Of one that adds to the bias from the first input to the last.");
 }
 
 /// A box in hex floats.

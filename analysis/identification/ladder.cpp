@@ -343,7 +343,9 @@ class Climb {
       return (missing.effect == rotor_effect()) == is_rotors;
     });
     if (fresh == fitted.rend())
-      return refuse(name, "no flight of the fit has slow flight with the duty of each of four motors");
+      return refuse(
+          name,
+          "no flight of the fit has slow flight with the duty, command or speed of each of four rotors");
     Trial next =
         trial(name, with_effects(with_effects(working_.models[0], specs_of(fitted)), best().turning));
     next.turning = best().turning;
@@ -382,7 +384,7 @@ class Climb {
   bool balances(Trial& next) {
     const auto before_N = imbalance_N(inputs_, best().model, ladder_.split.select, jobs_);
     if (!before_N) {
-      next.row.note = "the select flights have no slow flight with the duty of each motor";
+      next.row.note = "the select flights have no slow flight with the force of each rotor";
       return false;
     }
     const double after_N = *imbalance_N(inputs_, next.model, ladder_.split.select, jobs_);

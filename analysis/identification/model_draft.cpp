@@ -9,6 +9,7 @@
 
 #include "analysis/identification/draft_geometry.h"
 #include "analysis/identification/rotor_response.h"
+#include "analysis/identification/thrust_curve.h"
 #include "analysis/logs/flight_story.h"
 #include "analysis/logs/plausibility.h"
 #include "analysis/logs/read_log.h"
@@ -52,6 +53,7 @@ struct LogFit {
   double least_V = INFINITY, most_V = 0;  ///< of the battery in flight
   std::map<std::string, double> parameters;
   std::optional<RotorResponse> response;  ///< if the log has motor commands and rates
+  LoadBlocks loads;                       ///< empty without motor commands
 };
 
 /// Fits thrust over specific force along the thrust axis, in means over blocks: the mass, if the thrust is right.
@@ -69,6 +71,7 @@ LogFit fit(const logs::Log& log, const stability::Model& base) {
   const std::vector<char> air = logs::airborne(log);
   if (result.motors > 0 && log.signals.rates && log.hover_command > 0)
     result.response = rotor_response(log, air);
+  if (result.motors > 0 && log.hover_command > 0) result.loads = load_blocks(log, air);
   double thrust_N = 0, load = 0, start_s = -INFINITY;
   const auto close = [&] {
     if (load > 0) result.mass_kg.push_back(thrust_N / load);
@@ -159,6 +162,32 @@ std::vector<stability::RotorPlace> places_seen(const std::vector<LogFit>& fits, 
   return seen;
 }
 
+/// Sets the force of a rotor: the weight at the hover command, or the polynomial that the flights show.
+void draft_thrust(const LogFit& log, double hover_command, const std::vector<LogFit>& fits,
+                  ModelDraft& draft) {
+  const double each_N = draft.model.weight_N() / static_cast<double>(log.motors);
+  std::vector<LoadBlocks> loads;
+  for (const LogFit& one : fits) {
+    if (one.motors == log.motors) loads.push_back(one.loads);
+  }
+  const ThrustCurve found = thrust_curve(loads, log.motor_power);
+  std::array<double, 3> curve_N{};
+  const auto power = static_cast<std::size_t>(log.motor_power);
+  curve_N[power] = each_N / std::pow(hover_command, log.motor_power);
+  std::string source = fmt::format("fit: force proportional to {}, the weight at the hover command",
+                                   power == 2 ? "the square of the command" : "the command");
+  if (found.is_found()) {
+    for (std::size_t k = 0; k < 3; ++k) curve_N[k] = each_N * found.shares[static_cast<Eigen::Index>(k)];
+    source = "fit: polynomial of the command";
+  }
+  set_thrust_curve(curve_N, draft.model);
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (curve_N[k] == 0) continue;
+    draft.parameters.push_back(
+        {fmt::format("thrust_curve.force_N[{}]", k), curve_N[k], false, 0, 0, source + "; " + found.why});
+  }
+}
+
 /// Sets the rotors and their thrust from logs with motor commands: the weight at the hover command.
 void set_motors(const LogFit& log, double hover_command, const std::vector<LogFit>& fits, ModelDraft& draft) {
   stability::Model& model = draft.model;
@@ -188,14 +217,7 @@ void set_motors(const LogFit& log, double hover_command, const std::vector<LogFi
         p = {p.name, model.torque_per_thrust_m, false, 0, 0, "log parameters CA_ROTOR*_KM"};
     }
   }
-  const double each_N = model.weight_N() / static_cast<double>(log.motors);
-  std::array<double, 3> curve_N{};
-  curve_N[static_cast<std::size_t>(log.motor_power)] = each_N / std::pow(hover_command, log.motor_power);
-  set_thrust_curve(curve_N, model);
-  const std::string law = log.motor_power == 2 ? "the square of the command" : "the command";
-  add(fmt::format("thrust_curve.force_N[{}]", log.motor_power),
-      curve_N[static_cast<std::size_t>(log.motor_power)],
-      fmt::format("fit: force proportional to {}, the weight at the hover command", law));
+  draft_thrust(log, hover_command, fits, draft);
   for (const char* stated : {"MPC_THR_HOVER", "MOT_THST_HOVER"}) {
     const auto found = log.parameters.find(stated);
     if (found != log.parameters.end())

@@ -157,8 +157,9 @@ class MotionSearch {
     const bool is_down = world != nullptr && world->is_down;
     double bits = is_down ? -kDown : 0;
     // Who logs positions in centimetres logs velocities in centimetres per second: one habit, not two.
-    const bool is_one_habit = position != nullptr && velocity != nullptr && velocity->carried.divide > 1 &&
-                              position->carried.divide == velocity->carried.divide;
+    const bool is_one_habit = position != nullptr && velocity != nullptr &&
+                              velocity->carried.factor.divide > 1 &&
+                              position->carried.factor.divide == velocity->carried.factor.divide;
     if (is_one_habit) bits += kOtherUnit;
     if (position != nullptr && position->is_down != is_down) bits -= kMixed;
     if (attitude != nullptr && attitude->is_down != is_down) bits -= kMixed;
@@ -378,8 +379,7 @@ class Assigner {
       const ColumnGroup* const group = likeliest(quantity, width);
       if (group == nullptr) continue;
       const std::optional<UnitFactor> factor = unit_factor(signal, group->unit);
-      add({signal, group->topic, group->columns, factor ? group->unit : "", factor ? factor->multiply : 1,
-           factor ? factor->divide : 1});
+      add({signal, group->topic, group->columns, factor ? group->unit : "", factor.value_or(UnitFactor())});
     }
   }
 
@@ -492,12 +492,10 @@ class Assigner {
                              : high <= 1000 ? "permille"
                                             : "PWM";
     const int signal = driven.columns.size() == 4 && !is_pulse ? kDuty : kMotorCommand;
-    const UnitFactor factor = *unit_factor(signal, unit);
-    Carried carried{signal, driven.topic, driven.columns, unit, factor.multiply, factor.divide};
-    carried.offset = factor.offset;
+    const Carried carried{signal, driven.topic, driven.columns, unit, *unit_factor(signal, unit)};
     found_.decided.push_back(
         fmt::format("{}: read as commands of motors in {}, by their range", names_of(log_, carried), unit));
-    add(std::move(carried));
+    add(carried);
   }
 
   void assign_battery() {
@@ -507,7 +505,11 @@ class Assigner {
       const double middle = median(values(group, 0));
       const bool is_millivolt = middle > 500;
       if (middle < 2 || middle > 70000) continue;
-      add({kBattery, group.topic, group.columns, is_millivolt ? "mV" : "V", 1, is_millivolt ? 1000.0 : 1.0});
+      add({kBattery,
+           group.topic,
+           group.columns,
+           is_millivolt ? "mV" : "V",
+           {1, is_millivolt ? 1000.0 : 1.0}});
       return;
     }
   }
@@ -518,7 +520,7 @@ class Assigner {
     const ColumnGroup* const group = likeliest(quantity, 3);
     if (group == nullptr || std::count(group->columns.begin(), group->columns.end(), -1) == 3) return;
     if (knots_.time_s.empty()) {
-      add({signal, group->topic, group->columns, "", 1, 1});
+      add({signal, group->topic, group->columns, ""});
       return;
     }
     const Carried* const vehicle = found_.find(followed);
@@ -530,7 +532,7 @@ class Assigner {
         reading.is_down = reading.carried.sign[2] < 0;
         reading.bits += following_bits(knots_, own[0], reading) +
                         (reading.carried.sign == vehicle->sign ? 8 : 0) +
-                        (reading.carried.divide == vehicle->divide ? 8 : 0);
+                        (reading.carried.factor.divide == vehicle->factor.divide ? 8 : 0);
       }
     }
     if (all.empty()) return;

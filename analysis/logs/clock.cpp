@@ -24,7 +24,8 @@ std::vector<double> receiver_times_s(const RawTopic& topic) {
     if (row.signal != kTime || row.message.empty() || row.message != message_of(topic)) continue;
     const RawColumn *const time = topic.find(row.names.back()), *const week = topic.find(row.names[0]);
     if (time == nullptr || week == nullptr) continue;
-    for (const double value : time->values) times_s.push_back(1e-6 * value * row.multiply / row.divide);
+    for (const double value : time->values)
+      times_s.push_back(1e-6 * value * row.factor.multiply / row.factor.divide);
     for (std::size_t i = 0; row.names.size() > 1 && i < times_s.size(); ++i)
       times_s[i] =
           week->values[i] > 0 ? kReceiverEpoch_s - kLeap_s + kWeek_s * week->values[i] + times_s[i] : 0;
@@ -195,10 +196,10 @@ std::optional<Clock> stated_clock(const RawLog& log, const SignalMap& map) {
       clock = {static_cast<std::size_t>(column - topic.columns.data()), unit_s};
   };
   for (const SignalSource& source : map)
-    if (source.signal == kTime) find(source.column, 1e-6 * source.multiply / source.divide);
+    if (source.signal == kTime) find(source.column, 1e-6 * source.factor.scale());
   for (const NamedColumns& row : column_names())
     if (map.empty() && row.signal == kTime && row.message.empty())
-      find(row.names[0], 1e-6 * row.multiply / row.divide);
+      find(row.names[0], 1e-6 * row.factor.scale());
   const int named = map.empty() ? clock_by_name(topic) : -1;
   if (!clock && named >= 0) clock = {static_cast<std::size_t>(named), 0};
   if (!clock && !map.empty()) refuse_without_clock(log);
@@ -214,8 +215,7 @@ void set_times(RawLog& log, std::optional<Clock> clock) {
   }
   const RawColumn& column = topic.columns[clock->column];
   const std::string unit = stated_unit(column.name, true).unit;
-  const double stated_s =
-      unit.empty() ? 0 : 1e-6 * unit_factor(kTime, unit)->multiply / unit_factor(kTime, unit)->divide;
+  const double stated_s = unit.empty() ? 0 : 1e-6 * unit_factor(kTime, unit)->scale();
   topic.clock = column.name;
   topic.clock_unit_s = log.format == "usd" ? 1e-6  // the ticks of the deck
                        : clock->unit_s > 0 ? clock->unit_s

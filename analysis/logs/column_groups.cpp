@@ -78,25 +78,18 @@ class Grouping {
   }
 
   void add_family(IndexKind kind, const Members& members) {
-    switch (kind) {
-      case IndexKind::kAxis:
-        if (members.size() < 4 || readings_[static_cast<std::size_t>(members.at(0))].bits[kIsQuaternion] < 0)
-          add(run(members, 0, 3), kind);
-        if (members.size() == 4) add(run(members, 0, 4), kind);
-        break;
-      case IndexKind::kCompass:
-        if (members.count(2) > 0)
-          add(run(members, 0, 3), kind);
-        else if (members.size() > 1)
-          add({at(members, 1), at(members, 0), at(members, 3)}, kind, true);
-        break;
-      case IndexKind::kAngle:
-      case IndexKind::kRate:
-        if (kind == IndexKind::kAngle || members.size() == 3) add(run(members, 0, 3), kind);
-        break;
-      default:
-        add_numbered(members);
+    if (kind == IndexKind::kNumber) return add_numbered(members);
+    const bool is_compass = kind == IndexKind::kCompass,
+               is_four = kind == IndexKind::kAxis && members.size() == 4;
+    if (is_compass && members.count(2) == 0) {
+      if (members.size() > 1) add({at(members, 1), at(members, 0), at(members, 3)}, kind, true);
+      return;
     }
+    const bool is_quaternion =
+        is_four && readings_[static_cast<std::size_t>(members.at(0))].bits[kIsQuaternion] >= 0;
+    const bool is_part_of_rates = kind == IndexKind::kRate && members.size() != 3;
+    if (!is_quaternion && !is_part_of_rates) add(run(members, 0, 3), kind);
+    if (is_four) add(run(members, 0, 4), kind);
   }
 
   /// An array counts from 0 or from 1. A longer run of numbers is no vector: its names say nothing.

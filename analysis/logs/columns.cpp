@@ -40,25 +40,24 @@ std::string columns_name(int signal) {
   return kind.columns[static_cast<std::size_t>(signal - kind.first)];
 }
 
-std::string unit_of_factor(int signal, double factor, double offset) {
+bool is_same_scale(const UnitFactor& a, const UnitFactor& b) {
+  return std::abs(a.multiply * b.divide / (b.multiply * a.divide) - 1) < 1e-9;
+}
+
+std::string unit_of_factor(int signal, const UnitFactor& factor) {
   for (const auto& [name, unit] : kind_of_signal(signal).units)
-    if (std::abs(unit.multiply / unit.divide / factor - 1) < 1e-9 && unit.offset == offset) return name;
+    if (is_same_scale(unit, factor) && unit.offset == factor.offset) return name;
   return "";
 }
 
 bool is_same_meaning(const SignalMap& a, const SignalMap& b) {
   const auto is_in_b = [&](const SignalSource& one) {
     return std::any_of(b.begin(), b.end(), [&](const SignalSource& other) {
-      return one.signal == other.signal && one.column == other.column && one.offset == other.offset &&
-             std::abs(one.multiply * other.divide / (other.multiply * one.divide) - 1) < 1e-9;
+      return one.signal == other.signal && one.column == other.column &&
+             one.factor.offset == other.factor.offset && is_same_scale(one.factor, other.factor);
     });
   };
   return a.size() == b.size() && std::all_of(a.begin(), a.end(), is_in_b);
-}
-
-const SignalMap& known_columns() {
-  static const SignalMap map;
-  return map;
 }
 
 namespace {
@@ -110,8 +109,7 @@ SignalMap parse_columns(const std::string& text, const std::string& path) {
       if (frames.size() == 2)
         table.refuse("frame", "", "differs from the frame of another axis", "all three axes need one frame");
     }
-    map.push_back({in_body ? signal - kForceWorld + kForceBody : signal, table.text("column"),
-                   factor.multiply, factor.divide, unit, factor.offset});
+    map.push_back({in_body ? signal - kForceWorld + kForceBody : signal, table.text("column"), factor, unit});
   }
   return map;
 }

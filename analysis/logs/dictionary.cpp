@@ -56,9 +56,7 @@ void add_rows(const std::string& program, const TomlTable& file, const TomlTable
   row.unit = table.text("unit");
   const std::optional<UnitFactor> factor = unit_factor(row.signal, row.unit);
   if (!factor) table.refuse("unit", row.unit, "is no unit of the signal");
-  row.multiply = factor->multiply;
-  row.divide = factor->divide;
-  row.offset = factor->offset;
+  row.factor = *factor;
   if (table.has("open"))
     row.ask = table.choice("open", {"request or duty", "frame"}) == 0 ? Ask::kMotors : Ask::kVelocityFrame;
   row.origin = static_cast<Origin>((table.has("found") ? table : file).choice("found", origins));

@@ -66,7 +66,7 @@ struct NamedColumns {
   int signal = 0;
   std::vector<std::string> names;  ///< as returned by plain_name(), or verbatim if they contain a bracket
   std::string unit;
-  double multiply = 1, divide = 1, offset = 0;
+  UnitFactor factor;
   Ask ask = Ask::kNothing;
   Origin origin = Origin::kPrograms;
   std::array<double, 4> sign{1, 1, 1, 1};

@@ -28,8 +28,6 @@ std::vector<double> thrust_of(const Log& log) {
   return thrust;
 }
 
-double speed(const Sample& s) { return std::hypot(s.velocity_m_s[0], s.velocity_m_s[1], s.velocity_m_s[2]); }
-
 /// Inverts runs of `value` that are shorter than `shortest_s`, except at the ends of the log.
 void drop_short_runs(const Log& log, std::vector<char>& flags, char value, double shortest_s, bool at_ends) {
   std::size_t start = 0;
@@ -95,7 +93,7 @@ void add_runs(const Log& log, const std::string& kind, double shortest_s, const 
     open = false;
   };
   for (std::size_t i = 0; i < log.samples.size(); ++i) {
-    if (!holds(i)) continue;
+    if (!holds(log.samples[i])) continue;
     const double now = seconds(log, i);
     if (open && now - last > kApart_s) close();
     if (!open) start = now;
@@ -113,29 +111,16 @@ void add_events(const Log& log, const std::vector<char>& air, FlightStory& story
     const double pause_s = seconds(log, i) - seconds(log, i - 1);
     story.events.push_back({"dropout", seconds(log, i - 1), pause_s, "no record"});
   }
-  if (log.signals.force) {
-    add_runs(
-        log, "impact", 0, "more than 3 g",
-        [&](std::size_t i) {
-          const Vector& f = log.samples[i].specific_force_m_s2;
-          return std::hypot(f[0], f[1], f[2]) > kImpact_m_s2;
-        },
-        story.events);
-  }
-  if (log.signals.attitude) {
-    add_runs(
-        log, "impact", 0, "thrust axis more than 60 degrees from the vertical",
-        [&](std::size_t i) { return log.samples[i].attitude.rotation()[2][2] < 0.5; }, story.events);
-  }
-  if (log.signals.thrust == ThrustSource::kDuty) {
-    add_runs(
-        log, "saturation", 0.05, "a motor at full duty",
-        [&](std::size_t i) {
-          const auto& d = log.samples[i].duty;
-          return *std::max_element(d.begin(), d.end()) > 0.998;
-        },
-        story.events);
-  }
+  const auto is_hit = [](const Sample& s) { return norm(s.specific_force_m_s2) > kImpact_m_s2; };
+  const auto is_tilted = [](const Sample& s) { return s.attitude.rotation()[2][2] < 0.5; };
+  const auto is_full = [](const Sample& s) {
+    return *std::max_element(s.duty.begin(), s.duty.end()) > 0.998;
+  };
+  const char* const tilted = "thrust axis more than 60 degrees from the vertical";
+  if (log.signals.force) add_runs(log, "impact", 0, "more than 3 g", is_hit, story.events);
+  if (log.signals.attitude) add_runs(log, "impact", 0, tilted, is_tilted, story.events);
+  if (log.signals.thrust == ThrustSource::kDuty)
+    add_runs(log, "saturation", 0.05, "a motor at full duty", is_full, story.events);
   for (LogEvent& cycle : limit_cycles(log, air)) story.events.push_back(std::move(cycle));
   std::stable_sort(story.events.begin(), story.events.end(),
                    [](const LogEvent& a, const LogEvent& b) { return a.time_s < b.time_s; });
@@ -218,7 +203,7 @@ std::vector<char> airborne(const Log& log) {
   for (std::size_t i = 0; i < n; ++i) {
     time_s.push_back(seconds(log, i));
     height_m.push_back(log.samples[i].position_m[2]);
-    speed_m_s.push_back(speed(log.samples[i]));
+    speed_m_s.push_back(norm(log.samples[i].velocity_m_s));
   }
   const std::vector<double> standing = standing_heights_m(time_s, height_m, speed_m_s, idle);
   for (std::size_t i = 0; i < n; ++i) {

@@ -189,14 +189,13 @@ void Draft::add_measured_or_missing(const std::string& name, int signal, bool is
 void settle_judgement(Draft& draft) {
   const SignalTable& t = draft.table;
   Signals& signals = draft.log.signals;
-  const std::pair<bool, const char*> needed[] = {
-      {signals.specific_force != ForceSource::kNone,
-       "specific force, or a velocity or position to derive it from"},
-      {signals.thrust != ThrustSource::kNone,
-       "thrust: duty of the motors and battery voltage, or a commanded force"}};
-  for (const auto& [present, what] : needed) {
-    if (!present) signals.force_lacks += (signals.force_lacks.empty() ? "" : "; ") + std::string(what);
-  }
+  const auto lacks = [&lacking = signals.force_lacks](const std::string& what) {
+    lacking += (lacking.empty() ? "" : "; ") + what;
+  };
+  if (signals.specific_force == ForceSource::kNone)
+    lacks("specific force, or a velocity or position to derive it from");
+  if (signals.thrust == ThrustSource::kNone)
+    lacks("thrust: duty of the motors and battery voltage, or a commanded force");
   if (!signals.not_multirotor.empty())
     signals.force_lacks =
         "rotors that carry it: the log says that the vehicle is a " + signals.not_multirotor;

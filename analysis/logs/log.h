@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <limits>
 #include <map>
@@ -11,6 +12,8 @@
 namespace swarmcert::logs {
 
 using Vector = std::array<double, 3>;
+
+inline double norm(const Vector& v) { return std::hypot(v[0], v[1], v[2]); }
 
 /// Standard gravity as rounded in the authors' code, m/s^2; also used to convert newton to gram-force.
 inline constexpr double kGravity_m_s2 = 9.81;

@@ -63,7 +63,7 @@ void add_outputs(RawTopic& topic, const NamedColumns& row, const Parameters& par
     const auto found = is_assigned ? parameters.find(row.limits.at(which)) : parameters.end();
     return found != parameters.end() && found->second > 0 ? found->second : otherwise;
   };
-  const double first = row.offset, last = row.offset + row.divide / row.multiply;
+  const double first = row.factor.offset, last = first + row.factor.divide / row.factor.multiply;
   double low = limit(0, first), high = limit(1, last);
   if (!(high > low)) low = first, high = last;
   for (std::size_t k = 0; k < std::min(outputs.size(), kMostMotors); ++k) {
@@ -83,7 +83,7 @@ void add_columns(RawTopic& topic, const NamedColumns& row) {
   for (std::size_t k = 0; has_all && k < row.names.size(); ++k) {
     RawColumn copy{own_name(row.signal, k), topic.find(row.names[k])->values};
     if (topic.find(copy.name) != nullptr) continue;
-    for (double& value : copy.values) value *= row.sign[k] * row.multiply / row.divide;
+    for (double& value : copy.values) value *= row.sign[k] * row.factor.multiply / row.factor.divide;
     topic.columns.push_back(std::move(copy));
   }
 }

@@ -13,7 +13,6 @@ namespace swarmcert::logs {
 namespace {
 
 double dot(const Vector& a, const Vector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-double norm(const Vector& a) { return std::sqrt(dot(a, a)); }
 Vector difference(const Vector& a, const Vector& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
 
 bool is_near(double value, double expected) { return std::abs(value - expected) < 0.15 * std::abs(expected); }

@@ -93,7 +93,7 @@ Log read_log(const std::string& path, const SignalMap& map) {
   // Who states what the evidence says anyway gets the same log, with the evidence.
   SignalMap meaning;
   try {
-    Log log = read_as(path, known_columns(), &meaning);
+    Log log = read_as(path, {}, &meaning);
     if (is_same_meaning(meaning, map)) return log;
   } catch (const files::InputError&) {
     // The columns.toml may say what the evidence does not.
@@ -104,7 +104,7 @@ Log read_log(const std::string& path, const SignalMap& map) {
 SignalMap meaning_of_columns(const std::string& path, std::vector<std::string>& notes) {
   SignalMap meaning;
   try {
-    notes = read_as(path, known_columns(), &meaning).interpretation;
+    notes = read_as(path, {}, &meaning).interpretation;
   } catch (const files::InputError& error) {
     if (meaning.empty()) throw;
     notes = {error.what()};
@@ -117,12 +117,9 @@ bool looks_like_log(const std::string& path) {
   if (std::filesystem::is_directory(path)) return is_log_folder(path);
   if (is_log_name(std::filesystem::path(path).filename().string())) return true;
   if (std::filesystem::path(path).extension() == ".csv") return true;
-  if (format_of_file(path) != nullptr) return true;
-  if (is_pipe(path)) return false;
-  std::ifstream in(path, std::ios::binary);
-  if (!in) return false;
-  const std::string head = format_head(in);
-  return is_foreign_log(head) || (is_table(head) && is_flight_table(path));
+  const std::string head = head_of_file(path);
+  if (head.empty()) return false;
+  return format_of(head) != nullptr || is_foreign_log(head) || (is_table(head) && is_flight_table(path));
 }
 
 namespace {
@@ -156,8 +153,8 @@ bool is_flight_table(const std::string& path) {
     const std::string head = ends_of(path, kHead_bytes).first;
     if (!is_table(head)) return false;
     std::istringstream in(head);
-    const RawLog log = read_table(in, path, known_columns());
-    const Recognition found = recognise(log, known_columns());
+    const RawLog log = read_table(in, path, {});
+    const Recognition found = recognise(log, {});
     return found.find(kPosition) != nullptr || found.find(kVelocity) != nullptr ||
            found.find(kForceBody) != nullptr || has_torque_signals(found);
   } catch (const files::InputError&) {
@@ -168,13 +165,12 @@ bool is_flight_table(const std::string& path) {
 Interval time_span_s(const std::string& path) {
   constexpr std::streamoff kEnd_bytes = 16384;
   try {
-    std::ifstream whole(path, std::ios::binary);
-    const std::string first = format_head(whole);
+    const std::string first = head_of_file(path);
     if (looks_like_usd(first)) return {0, 0};  // its clock starts with the vehicle
     if (!is_table(first)) return absolute_span_s(read_raw(path));
     const auto [head, tail] = ends_of(path, kEnd_bytes);
     std::istringstream in(head.substr(0, head.rfind('\n') + 1) + tail);
-    const RawLog log = read_table(in, path, known_columns());
+    const RawLog log = read_table(in, path, {});
     const std::vector<double>& times = log.topics.front().time_s;
     return times.empty() ? Interval() : Interval(times.front(), times.back());
   } catch (const files::InputError&) {

@@ -14,11 +14,11 @@ namespace swarmcert::logs {
 /// Reads a log. The format is recognised by its content: micro-SD binary (old, versions 1 and 2), those of
 /// formats/formats.h, else CSV.
 /// @param path a file, a folder that holds one log, or FILE#VEHICLE (vehicles_in_file.h)
-/// @param map meaning of the columns of a CSV file; with known_columns() they are recognised by name
+/// @param map meaning of the columns of a CSV file; without it they are recognised by name and evidence
 /// @throws files::InputError if the file cannot be read at all; states the offset or line. Damage inside a file is not
 ///   an error: it is skipped and counted in Log::health. Also if the file holds the logs of several vehicles and
 ///   neither `path` nor `map` selects one of them.
-Log read_log(const std::string& path, const SignalMap& map = known_columns());
+Log read_log(const std::string& path, const SignalMap& map = {});
 
 /// Returns what read_log() takes the columns of a file for, also if they show no motion.
 /// @param notes receives what was decided from the data
@@ -26,10 +26,10 @@ Log read_log(const std::string& path, const SignalMap& map = known_columns());
 SignalMap meaning_of_columns(const std::string& path, std::vector<std::string>& notes);
 
 /// Returns the topics of a file as read_log() interprets them.
-RawLog read_uninterpreted(const std::string& path, const SignalMap& map = known_columns());
+RawLog read_uninterpreted(const std::string& path, const SignalMap& map = {});
 
 /// Like read_log() for a stream; `path` is used only in messages.
-Log parse_log(std::istream& in, const std::string& path, const SignalMap& map = known_columns());
+Log parse_log(std::istream& in, const std::string& path, const SignalMap& map = {});
 
 /// Returns true if the file is named like a log or a CSV file, starts like a micro-SD log, or is FILE#VEHICLE.
 bool looks_like_log(const std::string& path);

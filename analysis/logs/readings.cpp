@@ -9,7 +9,6 @@
 
 #include "analysis/logs/signal_table.h"
 #include "analysis/logs/statistics_of_series.h"
-#include "nn/base/pi.h"
 
 namespace swarmcert::logs {
 namespace {
@@ -39,15 +38,12 @@ const std::vector<double>& stored(const RawLog& log, const Carried& carried, std
   return log.topics[carried.topic].columns[static_cast<std::size_t>(carried.columns[k])].values;
 }
 
-/// Fills value and slope of the first three columns.
+/// Fills value and slope of the first three columns, as stored.
 void fill_vector(const RawLog& log, const Knots& knots, Reading& reading) {
   const Carried& carried = reading.carried;
   for (std::size_t k = 0; k < 3 && k < carried.size(); ++k) {
     if (carried.columns[k] < 0) continue;
     KnotSeries series = at_knots(knots, log.topics[carried.topic].time_s, stored(log, carried, k));
-    const double factor = carried.sign[k] * carried.multiply / carried.divide;
-    for (std::vector<double>* const values : {&series.value, &series.slope})
-      for (double& value : *values) value *= factor;
     reading.value[k] = std::move(series.value);
     reading.slope[k] = std::move(series.slope);
   }
@@ -234,8 +230,7 @@ class Reader {
     if (!factor) return false;
     reading.carried.signal = signal;
     reading.carried.unit = unit;
-    reading.carried.multiply = factor->multiply;
-    reading.carried.divide = factor->divide;
+    reading.carried.factor = *factor;
     const bool is_stated = !group_.unit.empty() && unit_factor(signal, group_.unit);
     reading.bits -= !is_stated ? against : group_.unit == unit ? 0 : kOtherThanStated;
     return true;
@@ -246,7 +241,7 @@ class Reader {
                   const Judge& judge) {
     Reading plain = base_;
     if (group_.columns.size() != 3 || !set_unit(plain, signal, unit, against)) return;
-    const double factor = plain.carried.multiply / plain.carried.divide;
+    const double factor = plain.carried.factor.scale();
     if (series_.value[0].empty() && series_.value[1].empty() && series_.value[2].empty()) {
       series_ = base_;
       fill_vector(log_, knots_, series_);
@@ -324,15 +319,10 @@ class Reader {
       angle[k].assign(knots_.time_s.size(), 0);
       if (group_.columns[k] < 0) continue;
       std::vector<double> values = stored(log_, base_.carried, k);
-      const double factor = reading.carried.sign[k] * reading.carried.multiply / reading.carried.divide;
-      double turns = 0, last = kNaN;
-      for (double& value : values) {
-        const double now = value * factor;
-        if (std::isfinite(now - last)) turns -= std::round((now - last) / (2 * kPi));
-        if (std::isfinite(now)) last = now;
-        value = now + 2 * kPi * turns;
-      }
-      largest = std::max(largest, std::abs(quantile_of(stored(log_, base_.carried, k), 0.99) * factor));
+      const double factor = reading.carried.sign[k] * reading.carried.factor.scale();
+      largest = std::max(largest, std::abs(quantile_of(values, 0.99) * factor));
+      for (double& value : values) value *= factor;
+      unwrap(values);
       angle[k] = at_knots(knots_, topic.time_s, values).value;
       if (k < 2) size = std::max(size, spread_of(angle[k]));
     }
@@ -398,7 +388,7 @@ std::vector<Reading> readings_of_known(const RawLog& log, const Knots& knots, co
 
 bool is_same_reading(const Carried& a, const Carried& b) {
   return a.signal == b.signal && a.columns == b.columns && a.sign == b.sign &&
-         std::abs(a.multiply * b.divide / (b.multiply * a.divide) - 1) < 1e-9;
+         is_same_scale(a.factor, b.factor);
 }
 
 bool is_same_signal(const Reading& a, const Reading& b) {

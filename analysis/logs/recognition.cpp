@@ -72,7 +72,7 @@ void recognise_row(const RawLog& log, const std::vector<ColumnIndex>& indices, c
         row.origin == Origin::kMessages || (row.origin == Origin::kOwn && log.format == "csv");
     if (is_of_messages && is_plain_table(log, topic)) continue;
     const std::vector<int> named = indices[t].columns_called(row.names, is_shortened);
-    Carried carried{row.signal, t, named, row.unit, row.multiply, row.divide, row.ask, row.sign};
+    Carried carried{row.signal, t, named, row.unit, row.factor, row.ask, row.sign};
     drop_empty_columns(topic, carried);
     const auto missing = std::count(carried.columns.begin(), carried.columns.end(), -1);
     const auto size = static_cast<std::ptrdiff_t>(carried.columns.size());
@@ -115,20 +115,22 @@ void join(Carried one, Recognition& found) {
   const int first = kind_of_signal(one.signal).first;
   const auto place = static_cast<std::size_t>(one.signal - first);
   Carried* group = found.find(first);
-  const bool is_alike = group != nullptr && group->topic == one.topic && group->divide == one.divide &&
-                        group->multiply == std::abs(one.multiply) && group->offset == one.offset;
+  UnitFactor factor = one.factor;
+  factor.multiply = std::abs(factor.multiply);
+  const bool is_alike = group != nullptr && group->topic == one.topic &&
+                        is_same_scale(group->factor, factor) && group->factor.offset == factor.offset;
   if (group != nullptr && !is_alike) return found.groups.push_back(std::move(one));
   if (group == nullptr) {
     found.groups.push_back(one);
     group = &found.groups.back();
     group->signal = first;
     group->columns.clear();
-    group->multiply = std::abs(one.multiply);
-    if (one.multiply < 0) group->unit.erase(0, 1);
+    group->factor = factor;
+    if (one.factor.multiply < 0) group->unit.erase(0, 1);
   }
   if (group->columns.size() <= place) group->columns.resize(place + 1, -1);
   group->columns[place] = one.columns[0];
-  if (one.multiply < 0) group->sign[place] = -1;
+  if (one.factor.multiply < 0) group->sign[place] = -1;
 }
 
 void recognise_by_map(const RawLog& log, const SignalMap& map, Recognition& found) {
@@ -138,8 +140,7 @@ void recognise_by_map(const RawLog& log, const SignalMap& map, Recognition& foun
   }
   for (const SignalSource& source : map) {
     if (source.signal == kTime) continue;
-    Carried carried{source.signal, 0, {-1}, source.unit, source.multiply, source.divide, Ask::kNothing};
-    carried.offset = source.offset;
+    Carried carried{source.signal, 0, {-1}, source.unit, source.factor};
     for (std::size_t t = 0; t < log.topics.size() && carried.columns[0] < 0; ++t) {
       for (std::size_t c = 0; c < log.topics[t].columns.size(); ++c) {
         const std::string& name = log.topics[t].columns[c].name;
@@ -230,8 +231,8 @@ SignalMap meaning_of(const RawLog& log, const Recognition& recognition) {
   SignalMap meaning;
   for (const RawTopic& topic : log.topics) {
     if (topic.clock.empty()) continue;
-    const double per_us = 1e6 * topic.clock_unit_s;
-    meaning.push_back({kTime, topic.clock, per_us, 1, unit_of_factor(kTime, per_us)});
+    const UnitFactor per_us{1e6 * topic.clock_unit_s};
+    meaning.push_back({kTime, topic.clock, per_us, unit_of_factor(kTime, per_us)});
     break;
   }
   for (const Carried& carried : recognition.groups) {
@@ -244,13 +245,13 @@ SignalMap meaning_of(const RawLog& log, const Recognition& recognition) {
         return &other < &topic && other.find(name) != nullptr;
       });
       const int signal = carried.signal + static_cast<int>(k);
-      const double factor =
-          (k < carried.sign.size() ? carried.sign[k] : 1) * carried.multiply / carried.divide;
-      meaning.push_back({signal, is_ambiguous ? topic.name + ": " + name : name, factor, 1,
-                         unit_of_factor(signal, factor, carried.offset), carried.offset,
-                         std::isfinite(carried.odds_bits) ? fmt::format("odds {:.0f} bits against {}",
-                                                                        carried.odds_bits, carried.runner_up)
-                                                          : "by its name"});
+      UnitFactor factor = carried.factor;
+      if (k < carried.sign.size()) factor.multiply *= carried.sign[k];
+      meaning.push_back(
+          {signal, is_ambiguous ? topic.name + ": " + name : name, factor, unit_of_factor(signal, factor),
+           std::isfinite(carried.odds_bits)
+               ? fmt::format("odds {:.0f} bits against {}", carried.odds_bits, carried.runner_up)
+               : "by its name"});
     }
   }
   return meaning;

@@ -19,10 +19,9 @@ struct Carried {
   std::size_t topic = 0;     ///< index into RawLog::topics
   std::vector<int> columns;  ///< index into RawTopic::columns, one per signal of the group; -1: missing
   std::string unit;
-  double multiply = 1, divide = 1;
+  UnitFactor factor{};
   Ask ask = Ask::kNothing;
   std::array<double, 4> sign{1, 1, 1, 1};  ///< of the columns of vectors and quaternions
-  double offset = 0;                       ///< subtracted from the stored numbers
   /// Evidence for this reading over `runner_up` if it was found by assignment.h; NaN: the names are known.
   double odds_bits = std::numeric_limits<double>::quiet_NaN();
   std::string runner_up{};

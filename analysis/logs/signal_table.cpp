@@ -48,14 +48,6 @@ std::vector<double> without_wraps(const RawColumn& column, const std::vector<dou
   return values;
 }
 
-/// Removes jumps of a whole turn from angles, so that they can be interpolated.
-void unwrap(std::vector<double>& angles, double turn) {
-  for (std::size_t i = 1; i < angles.size(); ++i) {
-    const double turns = std::round((angles[i] - angles[i - 1]) / turn);
-    if (std::isfinite(turns)) angles[i] -= turns * turn;
-  }
-}
-
 struct Series {
   std::vector<double> time_s, values;
 };
@@ -183,6 +175,14 @@ bool is_needed(int signal) {
 
 }  // namespace
 
+void unwrap(std::vector<double>& angles_rad) {
+  double last = kNaN;
+  for (double& angle : angles_rad) {
+    if (std::isfinite(angle - last)) angle -= 2 * kPi * std::round((angle - last) / (2 * kPi));
+    if (std::isfinite(angle)) last = angle;
+  }
+}
+
 double longest_gap_s(double step_s) { return std::max(kLongestGap_s, step_s > 0.02 ? 2.5 * step_s : 0); }
 
 double SignalTable::step_s() const { return 1e-6 * median_step(time_us); }
@@ -210,20 +210,21 @@ SignalTable signal_table(const RawLog& log, const Recognition& recognition, LogH
       if (carried.columns[k] < 0) continue;
       const RawColumn& column = topic.columns[static_cast<std::size_t>(carried.columns[k])];
       std::vector<double> values =
-          carried.divide == 1000
+          carried.factor.divide == 1000
               ? without_wraps(column, topic.time_s,
                               carried.signal == kPosition || carried.signal == kTargetPosition, events)
               : column.values;
       const double sign = k < carried.sign.size() ? carried.sign[k] : 1;
+      const UnitFactor& factor = carried.factor;
       for (double& value : values) {
-        value = sign * (value - carried.offset) * carried.multiply / carried.divide;
+        value = sign * (value - factor.offset) * factor.multiply / factor.divide;
         // Pulses of a servo signal go beyond the ends of its range.
-        if (carried.offset != 0 && std::isfinite(value)) value = std::clamp(value, 0.0, 1.0);
+        if (factor.offset != 0 && std::isfinite(value)) value = std::clamp(value, 0.0, 1.0);
       }
       for (std::size_t i = 0; i < signs.size(); ++i) values[i] *= signs[i];
       const int signal = carried.signal + static_cast<int>(k);
       if (carried.topic != recognition.clock) {
-        if (carried.signal == kEuler) unwrap(values, 2 * kPi);
+        if (carried.signal == kEuler) unwrap(values);
         values = resampled(topic_s, values, clock_s, signal == kBattery);
       }
       all[static_cast<std::size_t>(signal)] = std::move(values);

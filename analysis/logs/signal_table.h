@@ -51,4 +51,7 @@ SignalTable signal_table(const RawLog& log, const Recognition& recognition, LogH
 /// half steps in slow logs.
 double longest_gap_s(double step_s);
 
+/// Removes jumps of a whole turn from angles, so that they can be interpolated.
+void unwrap(std::vector<double>& angles_rad);
+
 }  // namespace swarmcert::logs

@@ -39,23 +39,23 @@ enum Signal : int {
   kNumSignals = 63
 };
 
-/// `signal` = (value of `column` - offset) * multiply / divide.
+/// A stored number less `offset`, times multiply / divide, is the signal in its own unit.
+struct UnitFactor {
+  double multiply = 1, divide = 1, offset = 0;
+
+  double scale() const { return multiply / divide; }
+};
+
 struct SignalSource {
   int signal;
   std::string column;  ///< or "TOPIC: COLUMN"
-  double multiply = 1, divide = 1;
-  std::string unit;  ///< of the column
-  double offset = 0;
+  UnitFactor factor;
+  std::string unit;   ///< of the column
   std::string why{};  ///< evidence, in words
 };
 
 /// The user's meaning of the columns. If empty, columns are recognised by name (dictionary.h) and evidence.
 using SignalMap = std::vector<SignalSource>;
-
-/// A stored number less `offset`, times multiply / divide, is the signal in its own unit.
-struct UnitFactor {
-  double multiply, divide, offset = 0;
-};
 
 /// Returns the factor of `unit`, spelled as in columns.toml; nothing if `signal` has no such unit.
 std::optional<UnitFactor> unit_factor(int signal, const std::string& unit);
@@ -63,15 +63,14 @@ std::optional<UnitFactor> unit_factor(int signal, const std::string& unit);
 /// Returns the name of one signal in columns.toml, "position_x"; empty if it has none.
 std::string columns_name(int signal);
 
-/// Returns the unit of columns.toml in which a stored number less `offset`, times `factor`, is the signal; empty if
-/// there is none.
-std::string unit_of_factor(int signal, double factor, double offset = 0);
+/// Returns whether both scales are the same.
+bool is_same_scale(const UnitFactor& a, const UnitFactor& b);
+
+/// Returns the unit of columns.toml that has this factor; empty if there is none.
+std::string unit_of_factor(int signal, const UnitFactor& factor);
 
 /// Returns whether both give the same columns the same signals and units.
 bool is_same_meaning(const SignalMap& a, const SignalMap& b);
-
-/// Returns the empty map.
-const SignalMap& known_columns();
 
 /// Describes columns.toml.
 void describe_columns_file(files::Keys& keys);

@@ -35,11 +35,13 @@ std::vector<double> load_factor(const Draft& draft) {
   return load;
 }
 
-std::vector<double> sum_of_powers(const SignalTable& t, const Rotors& rotors, double power) {
+/// @param with_battery multiply the values by the battery voltage
+std::vector<double> sum_of_powers(const SignalTable& t, const Rotors& rotors, double power,
+                                  bool with_battery = false) {
   std::vector<double> sum(t.size(), 0);
   for (int k = 0; k < rotors.count; ++k) {
     for (std::size_t i = 0; i < t.size(); ++i)
-      sum[i] += std::pow(std::max(t[rotors.first + k][i], 0.0), power);
+      sum[i] += std::pow(std::max(t[rotors.first + k][i], 0.0) * (with_battery ? t[kBattery][i] : 1), power);
   }
   return sum;
 }
@@ -99,12 +101,8 @@ bool is_requested(Draft& draft) {
   if (!t.has(kBattery)) return true;
   const std::vector<double> load = load_factor(draft);
   const std::vector<double> requested = sum_of_powers(t, {kRequested, kFour, ""}, 1);
-  std::vector<double> applied(t.size(), 0);
   // The thrust of a brushed motor is roughly proportional to its mean voltage to the power 1.5.
-  for (int k = 0; k < kFour; ++k) {
-    for (std::size_t i = 0; i < t.size(); ++i)
-      applied[i] += std::pow(std::max(t[kRequested + k][i], 0.0) * t[kBattery][i], 1.5);
-  }
+  const std::vector<double> applied = sum_of_powers(t, {kRequested, kFour, ""}, 1.5, true);
   const double of_request = hover_scale(requested, load).scatter,
                of_duty = hover_scale(applied, load).scatter;
   const bool request = of_request<of_duty, is_shown = of_request + of_duty> 0;

@@ -155,7 +155,7 @@ VehicleColumns prefixed_columns(const TableHeader& header) {
     RawLog log;
     log.topics.emplace_back();
     for (const std::string& name : *called.begin()) log.topics[0].columns.push_back({name, {}});
-    const Recognition found = recognise(log, known_columns());
+    const Recognition found = recognise(log, {});
     if (found.find(kPosition) != nullptr || found.find(kVelocity) != nullptr) return vehicles;
   }
   return {};
@@ -164,7 +164,7 @@ VehicleColumns prefixed_columns(const TableHeader& header) {
 bool may_hold_several(const std::string& path) {
   const std::string extension = std::filesystem::path(path).extension().string();
   return (extension == ".csv" || extension == ".CSV") && std::filesystem::is_regular_file(path) &&
-         format_of_file(path) == nullptr;
+         format_of(head_of_file(path)) == nullptr;
 }
 
 std::string rows_of_vehicle(std::string_view text, const TableHeader& header, const VehicleColumn& by,

@@ -33,13 +33,11 @@ bool is_number(const std::string& cell) {
   return !cell.empty() && cell.find_first_not_of("0123456789.+-eE %") == std::string::npos;
 }
 
-/// How a cell breaks into lines: numbers and short texts do not, long texts get room.
+/// How a cell breaks into lines: numbers and short texts do not, lists do, and long texts get room.
 const char* class_of(const std::string& cell) {
   constexpr std::size_t kShort_chars = 26, kLong_chars = 40;
-  return is_number(cell)               ? "number"
-         : cell.size() <= kShort_chars ? "short"
-         : cell.size() > kLong_chars   ? "long"
-                                       : "text";
+  const bool is_short = cell.size() <= kShort_chars && cell.find(", ") == std::string::npos;
+  return is_number(cell) ? "number" : is_short ? "short" : cell.size() > kLong_chars ? "long" : "text";
 }
 
 }  // namespace

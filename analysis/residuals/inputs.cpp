@@ -150,7 +150,7 @@ void set_network(stability::Model& model, const std::string& network) {
 Inputs read_inputs(const InputArguments& arguments) {
   Inputs inputs;
   inputs.rules = arguments.rules;
-  inputs.map = arguments.columns.empty() ? logs::known_columns() : logs::read_columns(arguments.columns);
+  inputs.map = arguments.columns.empty() ? logs::SignalMap() : logs::read_columns(arguments.columns);
   if (!arguments.columns.empty()) inputs.named_files.push_back(arguments.columns);
   if (!arguments.fleet.empty()) {
     inputs.fleet = read_fleet(arguments.fleet);

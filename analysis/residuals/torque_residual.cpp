@@ -22,29 +22,15 @@ std::string why_no_rotor_forces(const stability::Model& model, const Track& trac
   return fmt::format("the log has {} motors and the model {} rotors", motors, model.num_rotors());
 }
 
-/// Returns the torque of the rotors at `record`. Precondition: why_no_rotor_forces() is empty.
+/// Returns the torque of the rotors at `record`. Precondition: has_rotor_forces().
 Eigen::Vector3d rotor_torque_Nm(const stability::Model& model,
                                 const std::vector<stability::RotorPlace>& rotors, const Track& track,
                                 std::size_t record) {
-  const bool by_duty = track.thrust_source == logs::ThrustSource::kDuty;
-  const double battery_V = track.instants[record].battery_V;
-  double shares = 0;
-  const auto share = [&](std::size_t k) {
-    return std::pow(track.motor_command[record][k], track.motor_power);
-  };
-  for (std::size_t k = 0; k < rotors.size() && !by_duty; ++k) shares += share(k);
+  const RotorForces force_N = rotor_forces_N(model, track, record);
   Eigen::Vector3d torque = Eigen::Vector3d::Zero();
-  for (std::size_t k = 0; k < rotors.size(); ++k) {
-    double force_N = 0;
-    if (by_duty)
-      force_N = model.thrust.force_N(track.duty[record][k], battery_V);
-    else if (model.thrust_curve_N)
-      force_N = model.thrust.force_N(track.motor_command[record][k], battery_V);
-    else if (shares > 0)
-      force_N = track.given_thrust[record] * model.weight_N() * share(k) / shares;
-    torque +=
-        force_N * Eigen::Vector3d(rotors[k].y_m, -rotors[k].x_m, rotors[k].yaw_m(model.torque_per_thrust_m));
-  }
+  for (std::size_t k = 0; k < rotors.size(); ++k)
+    torque += force_N[k] *
+              Eigen::Vector3d(rotors[k].y_m, -rotors[k].x_m, rotors[k].yaw_m(model.torque_per_thrust_m));
   return torque;
 }
 
@@ -76,6 +62,31 @@ std::vector<Eigen::Vector3d> modelled_torque_B_Nm(const stability::Model& model,
 }
 
 }  // namespace
+
+bool has_rotor_forces(const stability::Model& model, const Track& track) {
+  return why_no_rotor_forces(model, track).empty();
+}
+
+RotorForces rotor_forces_N(const stability::Model& model, const Track& track, std::size_t record) {
+  const bool by_duty = track.thrust_source == logs::ThrustSource::kDuty;
+  const double battery_V = track.instants[record].battery_V;
+  const std::size_t rotors = model.num_rotors();
+  double shares = 0;
+  const auto share = [&](std::size_t k) {
+    return std::pow(track.motor_command[record][k], track.motor_power);
+  };
+  for (std::size_t k = 0; k < rotors && !by_duty; ++k) shares += share(k);
+  RotorForces force_N{};
+  for (std::size_t k = 0; k < rotors; ++k) {
+    if (by_duty)
+      force_N[k] = model.thrust.force_N(track.duty[record][k], battery_V);
+    else if (model.thrust_curve_N)
+      force_N[k] = model.thrust.force_N(track.motor_command[record][k], battery_V);
+    else if (shares > 0)
+      force_N[k] = track.given_thrust[record] * model.weight_N() * share(k) / shares;
+  }
+  return force_N;
+}
 
 std::vector<Eigen::Vector3d> rotor_torques(const stability::Model& model, const Kinds& kinds,
                                            const Track& track) {

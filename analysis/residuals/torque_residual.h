@@ -1,6 +1,7 @@
 /// @file Torque residual of a model: tau = J omega' + omega x J omega - tau_u - tau_a, in B.
 #pragma once
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -27,6 +28,15 @@ struct TorqueResidual {
 /// central difference over three records; tau_u and tau_a are averaged over the same records.
 /// @throws files::InputError if an effect of the model cannot be created.
 TorqueResidual torque_residual(const stability::Model& model, const Kinds& kinds, const Track& track);
+
+/// The force of each of the model's rotors, in their order; 0 beyond their number.
+using RotorForces = std::array<double, stability::kMostRotors>;
+
+/// Returns whether the log gives the duty, the command or the speed of each of the model's rotors.
+bool has_rotor_forces(const stability::Model& model, const Track& track);
+
+/// Returns the forces at `record`, without a motor lag. Precondition: has_rotor_forces().
+RotorForces rotor_forces_N(const stability::Model& model, const Track& track, std::size_t record);
 
 /// Returns the torque of the rotors after the model's motor lag, one per record, without the model's other effects.
 /// Empty if the log does not give the force of each rotor.

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
+#include <numeric>
 #include <stdexcept>
 
 namespace swarmcert::analysis {
@@ -37,17 +37,16 @@ double beta_quantile(int a, int b, double probability) {
 
 ConformalThreshold conformal_threshold(const std::vector<FlightScore>& scores, double level) {
   if (!(level > 0 && level < 1)) throw std::invalid_argument("conformal_threshold: level not in (0, 1)");
-  std::map<std::string, int> flights_of;
-  for (const FlightScore& score : scores) ++flights_of[score.group];
+  const std::vector<double> weights = group_weights(scores);
   ConformalThreshold result;
   result.level = level;
-  result.groups = static_cast<int>(flights_of.size());
+  result.groups = static_cast<int>(std::lround(std::accumulate(weights.begin(), weights.end(), 0.0)));
   result.flights = static_cast<int>(scores.size());
   if (result.groups < fewest_groups(level)) {
     throw std::invalid_argument("conformal_threshold: too few groups for this level");
   }
   std::vector<std::pair<double, double>> weighted;
-  for (const FlightScore& score : scores) weighted.emplace_back(score.value, 1.0 / flights_of[score.group]);
+  for (std::size_t i = 0; i < scores.size(); ++i) weighted.emplace_back(scores[i].value, weights[i]);
   std::sort(weighted.begin(), weighted.end());
   const double needed = level * (result.groups + 1) - kWeightRounding;
   double weight = 0;

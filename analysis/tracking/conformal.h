@@ -10,6 +10,7 @@
 #pragma once
 
 #include <array>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -31,6 +32,16 @@ struct ConformalThreshold {
   /// ceil(level (groups + 1)) is the rank of the threshold.
   Interval coverage_90;
 };
+
+/// Returns the weight of each flight: one over the number of flights in its group.
+template <class Flight>
+std::vector<double> group_weights(const std::vector<Flight>& flights) {
+  std::map<std::string, int> count;
+  for (const Flight& flight : flights) ++count[flight.group];
+  std::vector<double> weights;
+  for (const Flight& flight : flights) weights.push_back(1.0 / count[flight.group]);
+  return weights;
+}
 
 /// Returns the least number of groups for a level: level / (1 - level), rounded up. With fewer groups no finite
 /// threshold holds.

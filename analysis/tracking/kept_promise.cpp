@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <set>
 
 #include "analysis/tracking/conformal.h"
+#include "nn/base/doubles.h"
 #include "nn/base/file_io.h"
 #include "nn/base/input_error.h"
 #include "nn/base/json.h"
@@ -40,7 +40,7 @@ Promise read_promise(const std::string& path) {
   Promise promise;
   promise.path = path;
   promise.level = coverage["level"].get<double>();
-  promise.bound_m.fill(std::numeric_limits<double>::infinity());
+  promise.bound_m.fill(kInfinity);
   for (const Json& hash : coverage["made_from"]) {
     if (!hash.is_string()) refuse("coverage.made_from");
     promise.made_from.push_back(hash.get<std::string>());
@@ -55,8 +55,7 @@ Promise read_promise(const std::string& path) {
     for (int axis = 0; axis < 3; ++axis) {
       if (row["axis"] != stability::axis_name(axis)) continue;
       const bool has_total = row.contains("total") && row["total"].is_number();
-      promise.bound_m[static_cast<std::size_t>(axis)] =
-          has_total ? row["total"].get<double>() : std::numeric_limits<double>::infinity();
+      promise.bound_m[static_cast<std::size_t>(axis)] = has_total ? row["total"].get<double>() : kInfinity;
     }
   }
   return promise;

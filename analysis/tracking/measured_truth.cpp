@@ -99,17 +99,16 @@ std::map<std::string, CellsOfFlight> read_flights(const Json& document, const Re
   for (const Json& flight : document["flights"]) {
     if (!flight.is_object() || !flight.contains("residual_by_place"))
       refuse(path, "flights.residual_by_place", "", "is missing");
-    if (!flight["residual_by_place"].is_array() || flight.value("kind", "") != kind) continue;
+    const Json& places = flight["residual_by_place"];
+    if (!places.is_array() || places.empty() || flight.value("kind", "") != kind) continue;
     CellsOfFlight& cells = flights[flight.value("flight", "")];
-    for (const Json& cell : flight["residual_by_place"]) {
+    for (const Json& cell : places) {
       const std::size_t at = cell_of(cell, envelope, path);
       const Ranges ranges = ranges_of(cell, path);
       const auto [found, is_new] = cells.insert({at, ranges});
       if (!is_new) unite(found->second, ranges);
     }
   }
-  for (auto it = flights.begin(); it != flights.end();)
-    it = it->second.empty() ? flights.erase(it) : std::next(it);
   return flights;
 }
 
@@ -220,11 +219,10 @@ MeasuredTruth read_measured_truth(const std::string& path, const std::string& ki
   std::vector<std::pair<std::string, const CellsOfFlight*>> others;
   std::size_t n = 0;
   for (const auto& [name, cells] : flights) {
-    if (n++ % kShapeOf == 0) {
+    if (n++ % kShapeOf == 0)
       shape.push_back(&cells);
-    } else {
+    else
       others.emplace_back(name, &cells);
-    }
   }
   const auto fewest = static_cast<std::size_t>(fewest_groups(level));
   if (others.size() < fewest) {

@@ -37,15 +37,6 @@ Eigen::VectorXd free_solution(const Eigen::MatrixXd& G, const Eigen::VectorXd& f
   return result;
 }
 
-/// Weight of each flight: one over the number of flights in its group.
-std::vector<double> group_weights(const std::vector<FlownPeak>& flights) {
-  std::map<std::string, int> count;
-  for (const FlownPeak& flight : flights) ++count[flight.group];
-  std::vector<double> weights;
-  for (const FlownPeak& flight : flights) weights.push_back(1.0 / count[flight.group]);
-  return weights;
-}
-
 std::vector<double> largest_finite(const std::vector<FlownPeak>& flights) {
   std::vector<double> largest(flights.empty() ? 0 : flights.front().parts.size(), 0.0);
   for (const FlownPeak& flight : flights) {

@@ -83,6 +83,12 @@ class CertificateChecker {
   /// neighbour's term; and |f| <= jump for compositions next to one in which the network is silent.
   void check_jump(const Json& entry, const Bounded& moved, const std::vector<files::FunctionId>& names,
                   const std::string& where) const;
+  /// Verifies the errors stated of a float32 evaluation, from those of `output` and of the inputs of its network.
+  void check_float32_error(const Json& entry, const Bounded& output,
+                           const std::array<std::vector<Dyadic>, 2>& input_error,
+                           const std::string& where) const;
+  /// Returns a verified Lipschitz bound over all inputs of what follows the input clamp of `part`.
+  Dyadic unclamped_slope(const files::FunctionId& part) const;
   /// Returns the box of an entry as the input of the first layer of `part`.
   Intervals values_box(const Json& entry, const files::FunctionId& part, const std::string& where) const;
   /// The same with the errors of the inputs.
@@ -96,9 +102,9 @@ class CertificateChecker {
   const Json& certificate_;
   const files::Network network_;
   files::Parts parts_;
-  std::map<files::FunctionId, Dyadic> norms_;  ///< product of the verified norms, by network
-  std::map<std::string, Dyadic> proved_;       ///< verified upper bounds, by key()
-  std::set<std::string> local_;                ///< keys of the verified bounds that hold on the box only
+  std::map<files::FunctionId, std::vector<Dyadic>> norms_;  ///< verified norms of the layers, by network
+  std::map<std::string, Dyadic> proved_;                    ///< verified upper bounds, by key()
+  std::set<std::string> local_;  ///< keys of the verified bounds that hold on the box only
   int spectral_norms_ = 0, upper_bounds_ = 0, lower_bounds_ = 0, on_boxes_ = 0, values_ = 0;
 };
 

@@ -156,7 +156,7 @@ void CertificateChecker::check_layer(const Json& entry, const files::FunctionId&
   require(squared_norm(product(w, v)) >= Dyadic(lower) * lower * squared_norm(v),
           where + ": claims more than |W v| / |v|");
   check_upper({{w}, {}}, entry["proof"]["upper"], upper, where);
-  norms_[part] = norms_.emplace(part, 1.0).first->second * upper;
+  norms_[part].emplace_back(upper);
   ++spectral_norms_;
 }
 
@@ -219,7 +219,7 @@ void CertificateChecker::check_product(const Json& bound, const std::vector<file
   Dyadic total = scale.empty() ? 1.0 : *std::max_element(scale.begin(), scale.end());
   for (const files::FunctionId& part : names) {
     require(norms_.count(part) == 1, where + ": there is no network " + part.name());
-    total = total * norms_.at(part);
+    for (const Dyadic& norm : norms_.at(part)) total = total * norm;
     if (is_local && part == names.front()) {
       total = total * steepest_on_box(*parts_.at(part), local_inputs(bound, part, where));
       continue;

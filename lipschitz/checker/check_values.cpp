@@ -22,23 +22,29 @@ bool at_most(const std::vector<Dyadic>& a, const std::vector<Dyadic>& b) {
 
 /// Reads the bounds stated for one layer or for a sum.
 Bounded stated(const files::Json& json, std::size_t size, bool with_error, const std::string& where) {
-  files::require_keys(json, {"lower", "upper", "error"}, where);
-  require(json["error"].is_null() != with_error,
-          where + ": an error must be given if there are input errors, and only then");
-  Bounded result{{exact(hex_floats_in(json["lower"])), exact(hex_floats_in(json["upper"]))}, {}};
-  if (with_error) result.error = exact(hex_floats_in(json["error"]));
-  require(result.values.lower.size() == size && result.values.upper.size() == size &&
-              result.error.size() == (with_error ? size : 0),
-          where + ": needs one number per output");
+  files::require_keys(json, {"lower", "upper", "error", "error_in_order"}, where);
+  Bounded result{{exact(hex_floats_in(json["lower"])), exact(hex_floats_in(json["upper"]))}};
+  bool fits = result.values.lower.size() == size && result.values.upper.size() == size;
+  for (const Summation summation : {kAnyOrder, kInOrder}) {
+    const files::Json& error = json[summation == kAnyOrder ? "error" : "error_in_order"];
+    require(error.is_null() != with_error,
+            where + ": an error must be given if there are input errors, and only then");
+    if (with_error) result.error[summation] = exact(hex_floats_in(error));
+    fits = fits && result.error[summation].size() == (with_error ? size : 0);
+  }
+  require(fits, where + ": needs one number per output");
   return result;
 }
 
-void require_encloses(const Bounded& stated, const Intervals& values,
-                      const std::optional<std::vector<Dyadic>>& error, const std::string& where) {
-  require(at_most(stated.values.lower, values.lower) && at_most(values.upper, stated.values.upper),
-          where + ": the values leave the bounds");
-  if (!stated.error.empty())
-    require(error && at_most(*error, stated.error), where + ": claims less than the float32 error");
+/// @param found what was computed; nothing where float32 might overflow.
+void require_encloses(const Bounded& stated, const std::optional<Bounded>& found, const std::string& where) {
+  require(found.has_value(), where + ": claims less than the float32 error");
+  require(
+      at_most(stated.values.lower, found->values.lower) && at_most(found->values.upper, stated.values.upper),
+      where + ": the values leave the bounds");
+  for (const Summation summation : {kAnyOrder, kInOrder})
+    require(at_most(found->error[summation], stated.error[summation]),
+            where + ": claims less than the float32 error");
 }
 
 /// Verifies the bounds stated for every layer of a network with activations other than ReLU.
@@ -46,14 +52,15 @@ void check_enclosed_layers(const files::Weights& weights, const files::Json& jso
                            const std::string& where) {
   const std::vector<Intervals> found = layers_on_box(weights, input);
   for (std::size_t k = 0; k < found.size(); ++k)
-    require_encloses(stated(json[k], found[k].lower.size(), false, where), found[k], std::nullopt, where);
+    require_encloses(stated(json[k], found[k].lower.size(), false, where), Bounded{found[k]}, where);
 }
 
 /// Verifies the bounds stated for every layer of a network; returns those of the last layer.
-Bounded check_layers(const files::Weights& weights, const files::Json& json, Bounded input,
-                     const std::string& where) {
+/// @param norms bounds of the layers' spectral norms.
+Bounded check_layers(const files::Weights& weights, const std::vector<Dyadic>& norms, const files::Json& json,
+                     Bounded input, const std::string& where) {
   require(json.is_array() && json.size() == weights.layers.size(), where + ": needs one entry per layer");
-  const bool with_error = !input.error.empty();
+  const bool with_error = input.has_error();
   if (!weights.is_relu()) {
     require(!with_error, where + ": a float32 error of a network with activations other than ReLU");
     check_enclosed_layers(weights, json, input.values, where);
@@ -63,23 +70,12 @@ Bounded check_layers(const files::Weights& weights, const files::Json& json, Bou
     const files::Layer& layer = weights.layers[k];
     if (k > 0) input.values = relu_intervals(std::move(input.values));
     Bounded output = stated(json[k], static_cast<std::size_t>(layer.outputs), with_error, where);
-    require_encloses(output, layer_intervals(layer, input.values),
-                     with_error ? layer_error(layer, input.values, input.error) : std::nullopt, where);
+    const std::optional<Bounded> found = through_layer(layer, norms.at(k), input);
+    require_encloses(output, found, where);
+    output.added = found->added;
     input = std::move(output);
   }
   return input;
-}
-
-/// Verifies the bounds stated for the sum of `terms` and for every layer of rho; returns those of the last layer.
-Bounded check_sum(const files::Json& entry, const std::vector<SumTerm>& terms, const files::Weights& rho,
-                  const std::string& name, const std::string& where) {
-  const bool with_error = !entry["input_error"].is_null();
-  require(!with_error || rho.precision == files::Precision::kFloat32, where + kNotFloat32);
-  const auto size = static_cast<std::size_t>(rho.inputs());
-  Bounded sum = stated(entry["sum"], size, with_error, where + ": sum");
-  require_encloses(sum, sum_intervals(terms, size), with_error ? sum_error(terms, size) : std::nullopt,
-                   where + ": sum");
-  return check_layers(rho, entry["networks"].at(name), std::move(sum), where + ": " + name);
 }
 
 }  // namespace
@@ -87,7 +83,8 @@ Bounded check_sum(const files::Json& entry, const std::vector<SumTerm>& terms, c
 void CertificateChecker::check_values(const Json& entry) {
   files::require_keys(entry,
                       {"function", "neighbours", "domain", "input_error", "networks", "sum", "lower", "upper",
-                       "jump", "jump_hex", "float32_error", "float32_error_hex"},
+                       "jump", "jump_hex", "float32_error", "float32_error_hex", "float32_error_in_order",
+                       "float32_error_in_order_hex"},
                       "values");
   const files::FunctionId function = entry["function"].get<std::string>();
   const std::string where = "values of " + function.name();
@@ -112,17 +109,28 @@ void CertificateChecker::check_values(const Json& entry) {
             where + ": input_error is not of the function's inputs");
 
   Bounded result;
+  std::array<std::vector<Dyadic>, 2> input_error;  // of the network whose output is the result
   std::vector<SumTerm> terms;
   for (const files::FunctionId& part : inputs) {
     Bounded input = values_input(entry, part, where);
-    result = check_layers(*parts_.at(part), entry["networks"].at(part.name()), std::move(input),
-                          where + ": " + part.name());
+    input_error = input.error;
+    result = check_layers(*parts_.at(part), norms_.at(part), entry["networks"].at(part.name()),
+                          std::move(input), where + ": " + part.name());
     const bool is_ground = part.is_ground_phi();
     terms.push_back({result, is_ground ? 1 : 0, is_ground ? 1 : neighbours});
   }
   require(entry["sum"].is_null() != is_set,
           where + ": a sum must be given for set functions, and only for them");
-  if (is_set) result = check_sum(entry, terms, *parts_.at(names[1]), names[1].name(), where);
+  if (is_set) {
+    const files::Weights& rho = *parts_.at(names[1]);
+    require(!with_error || rho.precision == files::Precision::kFloat32, where + kNotFloat32);
+    const auto size = static_cast<std::size_t>(rho.inputs());
+    Bounded sum = stated(entry["sum"], size, with_error, where + ": sum");
+    require_encloses(sum, through_sum(terms, size), where + ": sum");
+    input_error = sum.error;
+    result = check_layers(rho, norms_.at(names[1]), entry["networks"].at(names[1].name()), std::move(sum),
+                          where + ": " + names[1].name());
+  }
   const std::vector<Dyadic> lower = exact(files::parse_hex_floats(entry["lower"]));
   const std::vector<Dyadic> upper = exact(files::parse_hex_floats(entry["upper"]));
   require(lower.size() == result.values.lower.size() && upper.size() == lower.size(),
@@ -135,15 +143,33 @@ void CertificateChecker::check_values(const Json& entry) {
               (at_most(lower, result.values.lower) && at_most(result.values.upper, upper)),
           where + ": the values leave the range");
   check_jump(entry, terms.front(), names, where);
-  require(
-      entry["float32_error"].is_null() != with_error && entry["float32_error_hex"].is_null() != with_error,
-      where + ": a float32 error must be given if there are input errors, and only then");
-  if (with_error) {
-    const Dyadic claimed =
-        number(entry["float32_error"], entry["float32_error_hex"], where + " float32_error");
-    require(claimed * claimed >= square(result.error), where + ": claims less than the float32 error");
-  }
+  check_float32_error(entry, result, input_error, where);
   ++values_;
+}
+
+void CertificateChecker::check_float32_error(const Json& entry, const Bounded& output,
+                                             const std::array<std::vector<Dyadic>, 2>& input_error,
+                                             const std::string& where) const {
+  const files::FunctionId part = files::FunctionId(entry["function"].get<std::string>()).output_part();
+  for (const Summation summation : {kAnyOrder, kInOrder}) {
+    const std::string name = summation == kAnyOrder ? "float32_error" : "float32_error_in_order";
+    const Json &decimal = entry[name], &hex = entry[name + "_hex"];
+    require(decimal.is_null() != output.has_error() && hex.is_null() != output.has_error(),
+            where + ": a float32 error must be given if there are input errors, and only then");
+    if (!output.has_error()) continue;
+    require(Dyadic(number(decimal, hex, where + " " + name)) >=
+                error_norm(output, input_error[summation], unclamped_slope(part), summation),
+            where + ": claims less than the float32 error");
+  }
+}
+
+Dyadic CertificateChecker::unclamped_slope(const files::FunctionId& part) const {
+  const auto bound = proved_.find(key(part, "all", {}));
+  const bool is_clamped = network_.clamp && files::is_clamped(part);
+  if (bound != proved_.end() && local_.count(bound->first) == 0 && !is_clamped) return bound->second;
+  Dyadic product = 1.0;
+  for (const Dyadic& norm : norms_.at(part)) product = product * norm;
+  return product;
 }
 
 void CertificateChecker::check_jump(const Json& entry, const Bounded& moved,
@@ -178,14 +204,14 @@ Intervals CertificateChecker::values_box(const Json& entry, const files::Functio
 
 Bounded CertificateChecker::values_input(const Json& entry, const files::FunctionId& part,
                                          const std::string& where) const {
-  Bounded input{values_box(entry, part, where), {}};
+  Bounded input{values_box(entry, part, where)};
   if (entry["input_error"].is_null()) return input;
   require(parts_.at(part)->precision == files::Precision::kFloat32, where + kNotFloat32);
-  input.error = exact(files::parse_hex_floats(entry["input_error"].at(part.name())));
-  require(
-      input.error.size() == input.values.lower.size() &&
-          std::all_of(input.error.begin(), input.error.end(), [](const Dyadic& x) { return x.sign() >= 0; }),
-      where + ": needs one input error per input, none negative");
+  const std::vector<Dyadic> error = exact(files::parse_hex_floats(entry["input_error"].at(part.name())));
+  require(error.size() == input.values.lower.size() &&
+              std::all_of(error.begin(), error.end(), [](const Dyadic& x) { return x.sign() >= 0; }),
+          where + ": needs one input error per input, none negative");
+  input.error = {error, error};
   return input;
 }
 

@@ -1,6 +1,7 @@
 /// @file The statements of a certificate of this schema, in words: certify writes them, the checker requires them.
 #pragma once
 
+#include <cstddef>
 #include <string>
 
 #include "nn/weights/network.h"
@@ -33,7 +34,10 @@ inline constexpr const char* kStatement =
     "where there is one: lower <= f <= upper, and |df| <= jump where one more neighbour comes or goes, "
     "whatever the others are, in exact arithmetic; and |g - f| <= float32_error for each g that float32 "
     "arithmetic may give, whose inputs after the clamp are off by at most input_error: sums of products in "
-    "any order, fused or not, each operation rounded to nearest.";
+    "any order, fused or not, each operation rounded to nearest; at most float32_error_in_order where those "
+    "of each layer start with the bias and add the products from the first input to the last, each rounded "
+    "or "
+    "fused.";
 
 /// Added for networks with a layer that is sorted.
 inline constexpr const char* kSortingStatement =
@@ -52,6 +56,10 @@ inline constexpr const char* kSilentStatement =
     "of vehicle are 0. Bounds and laws hold while the neighbours stay the same, lower bounds at witnesses "
     "among other neighbours than these. Ranges hold this 0, and jumps bound the steps as well by which one "
     "neighbour that comes or goes makes or ends such a composition, while all are in the box or clamp: ";
+
+/// How a float32 evaluation adds up the products of a layer: in any order, with or without fused multiply-adds; or to
+/// the bias from the first input to the last, each product rounded by itself or fused (nn/dense_layer.h).
+enum Summation : std::size_t { kAnyOrder, kInOrder };
 
 /// Returns the statement of a certificate for NET.
 std::string statement_for(const files::Network& network);

@@ -1,6 +1,9 @@
 #include "lipschitz/checker/values.h"
 
+#include <utility>
+
 #include "lipschitz/checker/activation_bounds.h"
+#include "lipschitz/checker/fixed_point.h"
 #include "nn/weights/compositions.h"
 #include "nn/weights/functions.h"
 
@@ -13,12 +16,78 @@ Dyadic largest_absolute(const Dyadic& lower, const Dyadic& upper) {
 }
 Dyadic count(long n) { return {mpz_class(n), 0}; }
 
-/// Returns `before` plus a bound on the round-off error of a sum of n summands whose absolute values add up to m.
-std::optional<Dyadic> rounding_error(long n, const Dyadic& m, const Dyadic& before) {
+Dyadic square(const std::vector<Dyadic>& values) {
+  Dyadic sum;
+  for (const Dyadic& x : values) sum += x * x;
+  return sum;
+}
+/// Multiples of 2^kErrorUnit, on which errors are rounded up. Far below the least float, 2^-149.
+constexpr long kErrorUnit = -160;
+/// At least the square root of x >= 0.
+Dyadic root_above(const Dyadic& x) {
+  const Dyadic scaled = ceil_to(x * Dyadic(1, -2 * kErrorUnit), 0);
+  const mpz_class units = scaled.mantissa << static_cast<mp_bitcnt_t>(scaled.exponent);
+  return {sqrt(units) + 1, kErrorUnit};
+}
+const Dyadic kLargestFloat = 0x1p126;  // with room for what is off
+
+/// Of a sum of n summands whose absolute values add up to m, in any order.
+std::optional<Dyadic> any_rounding(long n, const Dyadic& m) {
   constexpr long kMostSummands = 1L << 23;
-  if (n > kMostSummands || !(Dyadic(0x1p126) >= m + Dyadic(mpz_class(n), -149))) return std::nullopt;
+  if (n > kMostSummands || !(kLargestFloat >= m + Dyadic(mpz_class(n), -149))) return std::nullopt;
   const Dyadic nu(mpz_class(n), -24);
-  return before + (nu + nu * nu) * m + Dyadic(mpz_class(n), -148);
+  return (nu + nu * nu) * m + Dyadic(mpz_class(n), -148);
+}
+
+/// Of one operation whose exact result is at most `size`.
+Dyadic one_rounding(const Dyadic& size) {
+  const Dyadic least(1, -150);
+  if (size.sign() <= 0) return least;
+  const auto bits = static_cast<long>(mpz_sizeinbase(size.mantissa.get_mpz_t(), 2));
+  return Dyadic(1, size.exponent + bits - 25) + least;
+}
+
+/// Of the sum of the bias and the products of row i with inputs that lie in `inputs`, in order.
+std::optional<Dyadic> ordered_rounding(const Matrix& w, int i, const Dyadic& bias, const Intervals& inputs) {
+  Dyadic low = bias, high = bias, off;
+  for (int j = 0; j < w.cols; ++j) {
+    const auto k = static_cast<std::size_t>(j);
+    Dyadic least = w(i, j) * inputs.lower[k], most = w(i, j) * inputs.upper[k];
+    if (w(i, j).sign() < 0) std::swap(least, most);
+    low += least;
+    high += most;
+    const Dyadic product = largest_absolute(least, most);
+    off += one_rounding(product);
+    const Dyadic size = largest_absolute(low, high) + off;
+    if (!(kLargestFloat >= product + size)) return std::nullopt;
+    off = ceil_to(off + one_rounding(size), kErrorUnit);
+  }
+  return off;
+}
+
+/// Bounds on what the float32 evaluation of the layer adds to the errors of its inputs, entry by entry.
+std::optional<std::vector<Dyadic>> layer_rounding(const files::Layer& layer, const Matrix& w,
+                                                  const Intervals& inputs, const std::vector<Dyadic>& error,
+                                                  Summation summation) {
+  Intervals computed = inputs;
+  std::vector<Dyadic> sizes;
+  for (std::size_t k = 0; k < error.size(); ++k) {
+    sizes.push_back(largest_absolute(inputs.lower[k], inputs.upper[k]) + error[k]);
+    computed.lower[k] += -error[k];
+    computed.upper[k] += error[k];
+  }
+  std::vector<Dyadic> result;
+  for (int i = 0; i < layer.outputs; ++i) {
+    const Dyadic bias = layer.biases[static_cast<std::size_t>(i)];
+    Dyadic size = absolute(bias);
+    for (int j = 0; summation == kAnyOrder && j < layer.inputs; ++j)
+      size += absolute(w(i, j)) * sizes[static_cast<std::size_t>(j)];
+    const std::optional<Dyadic> one = summation == kAnyOrder ? any_rounding(layer.inputs + 1L, size)
+                                                             : ordered_rounding(w, i, bias, computed);
+    if (!one) return std::nullopt;
+    result.push_back(*one);
+  }
+  return result;
 }
 
 }  // namespace
@@ -82,43 +151,50 @@ Intervals sum_intervals(const std::vector<SumTerm>& terms, std::size_t size) {
   return sum;
 }
 
-std::optional<std::vector<Dyadic>> layer_error(const files::Layer& layer, const Intervals& inputs,
-                                               const std::vector<Dyadic>& error) {
-  std::vector<Dyadic> sizes;
-  for (std::size_t k = 0; k < error.size(); ++k)
-    sizes.push_back(largest_absolute(inputs.lower[k], inputs.upper[k]) + error[k]);
+std::optional<Bounded> through_layer(const files::Layer& layer, const Dyadic& norm, const Bounded& input) {
+  Bounded result{layer_intervals(layer, input.values)};
+  if (!input.has_error()) return result;
   const Matrix w(layer.outputs, layer.inputs, layer.weights);
-  std::vector<Dyadic> result;
-  for (int i = 0; i < layer.outputs; ++i) {
-    Dyadic size = absolute(layer.biases[static_cast<std::size_t>(i)]), before;
-    for (int j = 0; j < layer.inputs; ++j) {
-      const Dyadic factor = absolute(w(i, j));
-      size += factor * sizes[static_cast<std::size_t>(j)];
-      before += factor * error[static_cast<std::size_t>(j)];
-    }
-    const std::optional<Dyadic> total = rounding_error(layer.inputs + 1L, size, before);
-    if (!total) return std::nullopt;
-    result.push_back(*total);
+  for (const Summation summation : {kAnyOrder, kInOrder}) {
+    const std::vector<Dyadic>& before = input.error[summation];
+    const auto made = layer_rounding(layer, w, input.values, before, summation);
+    if (!made) return std::nullopt;
+    std::vector<Dyadic> error = *made;
+    for (int i = 0; i < layer.outputs; ++i)
+      for (int j = 0; j < layer.inputs; ++j)
+        error[static_cast<std::size_t>(i)] += absolute(w(i, j)) * before[static_cast<std::size_t>(j)];
+    result.error[summation] = std::move(error);
+    result.added[summation] = norm * input.added[summation] + root_above(square(*made));
   }
   return result;
 }
 
-std::optional<std::vector<Dyadic>> sum_error(const std::vector<SumTerm>& terms, std::size_t size) {
-  std::vector<Dyadic> result;
-  for (std::size_t i = 0; i < size; ++i) {
-    long summands = 1;
-    Dyadic sizes, before;
-    for (const SumTerm& term : terms) {
-      summands += term.most;
-      const Dyadic largest = largest_absolute(term.values.lower[i], term.values.upper[i]) + term.error[i];
-      sizes += count(term.most) * largest;
-      before += count(term.most) * term.error[i];
+std::optional<Bounded> through_sum(const std::vector<SumTerm>& terms, std::size_t size) {
+  Bounded result{sum_intervals(terms, size)};
+  if (!terms.front().has_error()) return result;
+  for (const Summation summation : {kAnyOrder, kInOrder}) {
+    for (std::size_t i = 0; i < size; ++i) {
+      long summands = 1;
+      Dyadic sizes, before;
+      for (const SumTerm& term : terms) {
+        const Dyadic& error = term.error[summation][i];
+        summands += term.most;
+        sizes += count(term.most) * (largest_absolute(term.values.lower[i], term.values.upper[i]) + error);
+        before += count(term.most) * error;
+      }
+      const std::optional<Dyadic> rounding = any_rounding(summands, sizes);
+      if (!rounding) return std::nullopt;
+      result.error[summation].push_back(before + *rounding);
     }
-    const std::optional<Dyadic> total = rounding_error(summands, sizes, before);
-    if (!total) return std::nullopt;
-    result.push_back(*total);
   }
   return result;
+}
+
+Dyadic error_norm(const Bounded& output, const std::vector<Dyadic>& input_error, const Dyadic& slope,
+                  Summation summation) {
+  const Dyadic by_entry = root_above(square(output.error[summation]));
+  const Dyadic by_norm = slope * root_above(square(input_error)) + output.added[summation];
+  return by_entry < by_norm ? by_entry : by_norm;
 }
 
 Dyadic largest_square(const Intervals& intervals) {
@@ -140,7 +216,7 @@ Dyadic silent_step_square(const files::Network& network, const files::FunctionId
     const files::Weights& rho = *networks.at(function.output_part());
     std::vector<SumTerm> terms;
     for (const files::FunctionId& part : parts)
-      terms.push_back({{network_intervals(*networks.at(part), inputs(part)), {}}, 1, 1});
+      terms.push_back({{network_intervals(*networks.at(part), inputs(part))}, 1, 1});
     const Intervals sum = sum_intervals(terms, static_cast<std::size_t>(rho.inputs()));
     largest = larger(largest, largest_square(network_intervals(rho, sum)));
   }
@@ -148,11 +224,5 @@ Dyadic silent_step_square(const files::Network& network, const files::FunctionId
 }
 
 const Dyadic& larger(const Dyadic& a, const Dyadic& b) { return a >= b ? a : b; }
-
-Dyadic square(const std::vector<Dyadic>& values) {
-  Dyadic sum;
-  for (const Dyadic& x : values) sum += x * x;
-  return sum;
-}
 
 }  // namespace swarmcert::check

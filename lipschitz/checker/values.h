@@ -2,12 +2,14 @@
 /// for users.
 #pragma once
 
+#include <array>
 #include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "lipschitz/checker/dyadic.h"
+#include "lipschitz/checker/statement.h"
 #include "nn/weights/activation_function.h"
 #include "nn/weights/network.h"
 
@@ -18,10 +20,13 @@ struct Intervals {
   std::vector<Dyadic> lower, upper;
 };
 
-/// Intervals of a vector, and bounds on the error of its float32 evaluation.
+/// Intervals of a vector, and bounds on the error of its float32 evaluation, by Summation.
 struct Bounded {
   Intervals values;
-  std::vector<Dyadic> error;  ///< entry by entry; empty: no bound on float32 errors
+  std::array<std::vector<Dyadic>, 2> error = {};  ///< entry by entry; empty: no bound on float32 errors
+  std::array<Dyadic, 2> added = {};  ///< norm of what the layers of this network add to the error
+
+  bool has_error() const { return !error[kAnyOrder].empty(); }
 };
 
 /// Returns intervals of W h + b for h in `inputs`.
@@ -42,17 +47,23 @@ struct SumTerm : Bounded {
 /// Returns intervals of the sum of all terms.
 Intervals sum_intervals(const std::vector<SumTerm>& terms, std::size_t size);
 
-/// Returns a bound, entry by entry, on the difference between the float32 evaluation of W h + b and its exact value at
-/// h, if the float32 input is within `error` of h. Sums of products may be computed in any order, with or without fused
-/// multiply-adds. Returns nothing if float32 might overflow or there are more than 2^23 summands.
+/// Returns what a layer makes of its input: exact intervals of W h + b and, where the input has errors, bounds on the
+/// error of the float32 evaluation. Returns nothing if float32 might overflow or there are more than 2^23 summands.
 ///
-/// With u = 2^-24, an operation with exact result r returns r (1 + d) + e, |d| <= u, |e| <= 2^-150. A sum of n such
-/// summands whose absolute values add up to m has an error of at most ((1 + u)^n - 1) m + (2 n - 1) 2^-150 (1 + u)^n
-/// (by induction over the additions), which is at most (n u + n^2 u^2) m + n 2^-148 as long as n u <= 1/2.
-std::optional<std::vector<Dyadic>> layer_error(const files::Layer& layer, const Intervals& inputs,
-                                               const std::vector<Dyadic>& error);
-/// The same for a sum of terms that starts from zero.
-std::optional<std::vector<Dyadic>> sum_error(const std::vector<SumTerm>& terms, std::size_t size);
+/// With u = 2^-24, an operation with exact result r returns r (1 + d) + e, |d| <= u, |e| <= 2^-150. In any order, a sum
+/// of n summands whose absolute values add up to m has an error of at most
+///   ((1 + u)^n - 1) m + (2 n - 1) 2^-150 (1 + u)^n
+/// (by induction over the additions), which is at most (n u + n^2 u^2) m + n 2^-148 as long as n u <= 1/2. In order,
+/// each operation is off by at most half the distance between floats below a power of two above its result, which lies
+/// between the ends of the partial sum. `added` grows by the norm of this after the norm of the matrix.
+/// @param norm at least the spectral norm of the layer.
+std::optional<Bounded> through_layer(const files::Layer& layer, const Dyadic& norm, const Bounded& input);
+/// Returns what a sum of terms that starts from zero makes of them, in any order. Nothing as above.
+std::optional<Bounded> through_sum(const std::vector<SumTerm>& terms, std::size_t size);
+/// Returns a bound on the norm of the error behind a network: the smaller one of that of its entries and of that of the
+/// input's error after `slope`, a Lipschitz bound of the network, with what the layers added.
+Dyadic error_norm(const Bounded& output, const std::vector<Dyadic>& input_error, const Dyadic& slope,
+                  Summation summation);
 
 /// Returns the sum of squares of the largest absolute values.
 Dyadic largest_square(const Intervals& intervals);
@@ -63,7 +74,5 @@ Dyadic largest_square(const Intervals& intervals);
 Dyadic silent_step_square(const files::Network& network, const files::FunctionId& function,
                           const std::function<Intervals(const files::FunctionId& part)>& inputs);
 const Dyadic& larger(const Dyadic& a, const Dyadic& b);
-/// Returns the sum of squares.
-Dyadic square(const std::vector<Dyadic>& values);
 
 }  // namespace swarmcert::check

@@ -159,7 +159,7 @@ Intervals enclosed(const Term& term, const std::vector<float>& x) {
 Intervals enclosed(const SlopeFunction& f, const std::vector<float>& x, std::vector<check::SumTerm> terms) {
   Intervals value = enclosed(f.moved, x);
   if (f.rho == nullptr) return value;
-  terms.push_back({{std::move(value), {}}, 1, 1});
+  terms.push_back({{std::move(value)}, 1, 1});
   return check::network_intervals(*f.rho,
                                   check::sum_intervals(terms, static_cast<std::size_t>(f.rho->inputs())));
 }
@@ -193,7 +193,7 @@ mpq_class exact_rise(const SlopeFunction& f, const SlopePoints& points) {
 mpq_class least_rise(const SlopeFunction& f, const SlopePoints& points) {
   std::vector<check::SumTerm> others;
   for (std::size_t j = 0; j < f.others.size(); ++j)
-    others.push_back({{enclosed(f.others[j], points.others[j]), {}}, 1, 1});
+    others.push_back({{enclosed(f.others[j], points.others[j])}, 1, 1});
   return least_squared_distance(enclosed(f, points.x, others), enclosed(f, points.y, others));
 }
 

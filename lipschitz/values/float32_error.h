@@ -35,7 +35,7 @@ struct Float32Options {
 std::vector<double> input_errors(const Box& box, double step);
 
 /// Returns error bounds that hold in exact arithmetic for the order of summation of nn/mlp.h and nn/deep_set.h, with or
-/// without fused multiply-adds. (The bounds in the certificate hold for any order.)
+/// without fused multiply-adds. (The certificate states wider ones for this order, and others for any.)
 ///
 /// A computed layer differs from the exact layer at the same computed inputs by at most delta_k, entry by entry
 /// (layer_rounding()). Replacing the computed layers by exact ones from the last to the first changes the output by at

@@ -47,14 +47,17 @@ class Values {
     if (names.size() == 2 && parts_.count(files::FunctionId::ground_phi()) == 1)
       inputs.emplace_back(files::FunctionId::ground_phi());
     Bounded values;
+    std::array<std::vector<Dyadic>, 2> input_error;  // of the network whose output is the function's
     std::vector<check::SumTerm> terms;
     for (const files::FunctionId& name : inputs) {
       const Box& box = domain_.at(name);
-      values = {{exact_numbers(box.lower), exact_numbers(box.upper)}, {}};
+      values = {{exact_numbers(box.lower), exact_numbers(box.upper)}};
       if (options_.float32) {
         found.input_error[name] = input_errors(box, options_.input_step);
-        values.error = exact_numbers(found.input_error[name]);
+        const std::vector<Dyadic> error = exact_numbers(found.input_error[name]);
+        values.error = {error, error};
       }
+      input_error = values.error;
       if (!through_layers(name, values, found)) return std::nullopt;
       const bool is_ground = name.is_ground_phi();
       terms.push_back({values, is_ground ? 1 : 0, is_ground ? 1 : neighbours});
@@ -64,15 +67,20 @@ class Values {
       const double slope = rho_bound.at(names[1].kind());
       const Dyadic square = Dyadic(slope) * slope * check::largest_square(terms.front().values);
       found.jump = sqrt_up(check::larger(square, check::silent_step_square(network_, function, boxes())));
-      found.sum = rounded(check::sum_intervals(terms, size),
-                          options_.float32 ? check::sum_error(terms, size) : std::nullopt, values);
+      found.sum = rounded(check::through_sum(terms, size), values);
+      input_error = values.error;
       if (!found.sum || !std::isfinite(*found.jump) || !through_layers(names[1], values, found))
         return std::nullopt;
     }
     state_ends(found);
     if (!options_.float32) return found;
-    found.float32_error = sqrt_up(check::square(values.error));
-    return std::isfinite(*found.float32_error) ? std::optional(found) : std::nullopt;
+    for (const check::Summation summation : {check::kAnyOrder, check::kInOrder}) {
+      const double bound = rounded_up(
+          check::error_norm(values, input_error[summation], slope(function.output_part()), summation));
+      if (!std::isfinite(bound)) return std::nullopt;
+      found.float32_error[summation] = bound;
+    }
+    return found;
   }
 
  private:
@@ -95,18 +103,28 @@ class Values {
     }
   }
 
+  /// As the checker takes it: CertificateChecker::unclamped_slope().
+  Dyadic slope(const files::FunctionId& part) const {
+    const auto bound = options_.slopes.find(part);
+    if (bound != options_.slopes.end() && !(network_.clamp && files::is_clamped(part))) return bound->second;
+    Dyadic product = 1.0;
+    for (const double norm : options_.norms.at(part)) product = product * norm;
+    return product;
+  }
+
   /// Rounds outwards what the checker computes, and makes it the values from here on. Nothing where it is not finite.
-  std::optional<VectorBounds> rounded(const check::Intervals& exact,
-                                      const std::optional<std::vector<Dyadic>>& error,
-                                      Bounded& values) const {
-    VectorBounds result{each(exact.lower, rounded_down), each(exact.upper, rounded_up), {}};
-    if (options_.float32) {
-      if (!error) return std::nullopt;
-      result.error = each(*error, rounded_up);
+  std::optional<VectorBounds> rounded(const std::optional<Bounded>& exact, Bounded& values) const {
+    if (!exact) return std::nullopt;
+    VectorBounds result{each(exact->values.lower, rounded_down), each(exact->values.upper, rounded_up), {}};
+    bool is_finite = all_finite(result.lower) && all_finite(result.upper);
+    for (const check::Summation summation : {check::kAnyOrder, check::kInOrder}) {
+      result.error[summation] = each(exact->error[summation], rounded_up);
+      is_finite = is_finite && all_finite(result.error[summation]);
     }
-    if (!all_finite(result.lower) || !all_finite(result.upper) || !all_finite(result.error))
-      return std::nullopt;
-    values = {{exact_numbers(result.lower), exact_numbers(result.upper)}, exact_numbers(result.error)};
+    if (!is_finite) return std::nullopt;
+    values = {{exact_numbers(result.lower), exact_numbers(result.upper)}, {}, exact->added};
+    for (const check::Summation summation : {check::kAnyOrder, check::kInOrder})
+      values.error[summation] = exact_numbers(result.error[summation]);
     return result;
   }
 
@@ -114,18 +132,18 @@ class Values {
     std::vector<VectorBounds>& layers = found.layers[name];
     if (!parts_.at(name)->is_relu()) {
       for (const check::Intervals& exact : check::layers_on_box(*parts_.at(name), values.values)) {
-        const std::optional<VectorBounds> bounds = rounded(exact, std::nullopt, values);
+        const std::optional<VectorBounds> bounds = rounded(Bounded{exact}, values);
         if (!bounds) return false;
         layers.push_back(*bounds);
       }
       return true;
     }
-    for (const files::Layer& layer : parts_.at(name)->layers) {
-      if (!layers.empty()) values.values = check::relu_intervals(std::move(values.values));
-      const check::Intervals exact = check::layer_intervals(layer, values.values);
-      const auto error =
-          options_.float32 ? check::layer_error(layer, values.values, values.error) : std::nullopt;
-      const std::optional<VectorBounds> bounds = rounded(exact, error, values);
+    const std::vector<files::Layer>& of_network = parts_.at(name)->layers;
+    for (std::size_t k = 0; k < of_network.size(); ++k) {
+      if (k > 0) values.values = check::relu_intervals(std::move(values.values));
+      const double norm = options_.float32 ? options_.norms.at(name).at(k) : 0;
+      const std::optional<VectorBounds> bounds =
+          rounded(check::through_layer(of_network[k], norm, values), values);
       if (!bounds) return false;
       layers.push_back(*bounds);
     }

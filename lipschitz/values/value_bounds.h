@@ -1,12 +1,14 @@
 /// @file Ranges, jumps and float32 errors for a certificate: bounds layer by layer that the checker can verify.
 #pragma once
 
+#include <array>
 #include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "lipschitz/base/box.h"
+#include "lipschitz/checker/statement.h"
 #include "nn/weights/network.h"
 
 namespace swarmcert::lipschitz {
@@ -14,12 +16,14 @@ namespace swarmcert::lipschitz {
 /// Bounds on the output of a layer or on a sum of terms over a box, rounded outwards.
 struct VectorBounds {
   std::vector<double> lower, upper;
-  std::vector<double> error;  ///< error of the float32 evaluation, entry by entry; empty: not bounded
+  /// Errors of the float32 evaluation, entry by entry, by check::Summation; empty: not bounded.
+  std::array<std::vector<double>, 2> error;
 };
 
 /// Bounds in a certificate on the values of one function over a box (checker/statement.h). Computed by intervals, layer
 /// by layer, and for activations other than ReLU also by linear forms (checker/centred_form.h). They are wider than the
-/// branch-and-bound results of range.h and float32_error.h, but easy to verify.
+/// branch-and-bound results of range.h and float32_error.h, but easy to verify. Of an error there are two bounds: one
+/// for sums in any order, and one for the order of nn/dense_layer.h.
 struct CertifiedValues {
   files::FunctionId function;  ///< "network" or "set:<phi kind>:<rho kind>"
   int neighbours = 0;          ///< largest number of neighbours of the kind; 0 for a plain network
@@ -31,8 +35,8 @@ struct CertifiedValues {
   /// Bounds of f: those of the last layer; widened to contain 0 if NET is silent for some composition of at most
   /// `neighbours` neighbours, and exactly 0 if it is silent for all of them.
   std::vector<double> lower, upper;
-  std::optional<double> jump;           ///< change when a neighbour enters or leaves, Euclidean norm
-  std::optional<double> float32_error;  ///< Euclidean norm
+  std::optional<double> jump;  ///< change when a neighbour enters or leaves, Euclidean norm
+  std::array<std::optional<double>, 2> float32_error;  ///< Euclidean norm, by check::Summation
 };
 
 struct ValueOptions {
@@ -42,6 +46,10 @@ struct ValueOptions {
   /// ReLU.
   bool float32 = false;
   double input_step = 0;  ///< inputs are multiples of this, rounded to nearest; 0: only rounded to float32
+  /// For the float32 errors: proved spectral norms of the layers and, where the certificate contains one that holds for
+  /// all inputs, the Lipschitz bound of a network.
+  std::map<files::FunctionId, std::vector<double>> norms = {};
+  std::map<files::FunctionId, double> slopes = {};
 };
 
 /// Returns the value bounds of the plain network, or of every set function of a kind of neighbours. Omits bounds that

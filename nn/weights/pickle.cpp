@@ -335,8 +335,7 @@ class Machine {
   }
 
   void push_global(std::string_view module, std::string_view global) {
-    const bool is_dict = module == "collections" &&
-                         (global == "OrderedDict" || global == "defaultdict" || global == "Counter");
+    const bool is_dict = module == "collections" && (global == "OrderedDict" || global == "defaultdict");
     if (is_dict) return push(make(Kind::kGlobal, kOrderedDict));
     const bool is_numpy = module == "numpy" || module.substr(0, 6) == "numpy.";
     if (is_numpy && global == "_reconstruct") return push(make(Kind::kGlobal, kNewArray));

@@ -31,6 +31,30 @@ struct LayerParts {
   std::size_t bias = kNone;
 };
 
+/// Returns the names of the layers that have matrices, parametrised or not.
+std::vector<std::string> layers_in(const std::vector<DeclaredTensor>& tensors) {
+  std::vector<std::string> layers;
+  for (const DeclaredTensor& tensor : tensors) {
+    if (tensor.shape.size() != 2) continue;
+    const std::string name = tensor.name.substr(0, tensor.name.find(".parametrizations."));
+    const std::size_t end = name.size() < tensor.name.size() ? name.size() : name.rfind('.');
+    if (end != name.size() && name.compare(end + 1, 6, "weight") != 0) continue;  // npos + 1 is 0
+    layers.push_back(end == std::string::npos ? "" : name.substr(0, end));
+  }
+  return layers;
+}
+
+/// The hint for a tensor that is of no layer: a selection of layers or of modules leaves it out.
+std::string ways_to_leave_out(const std::vector<std::string>& layers) {
+  std::vector<std::string> modules = modules_of(layers);
+  if (modules.front().empty()) modules = layers;
+  if (modules.empty() || modules.front().empty()) return kOnlyLinear;
+  std::string list;
+  for (const std::string& module : modules) list += (list.empty() ? "" : ", ") + module;
+  return "name the network to certify, which leaves this out, with --select and one of " + list +
+         "; or several in the order of evaluation: --select A,B";
+}
+
 class Assembler {
  public:
   Assembler(const std::vector<DeclaredTensor>& tensors, const TensorReader& read, const std::string& path,
@@ -154,7 +178,7 @@ class Assembler {
     if (is_part(i, "weight", layer)) return;
     if (!is_part(i, "bias", layer)) {
       refuse(i, shape_text(tensors_[i].shape), "is neither the weight nor the bias of a linear layer",
-             kOnlyLinear);
+             ways_to_leave_out(layers_in(tensors_)));
     }
     LayerParts* owner = nullptr;
     for (LayerParts& parts : parts_)
@@ -232,31 +256,27 @@ class Assembler {
   std::set<std::string> names_;
 };
 
-/// Returns whether a tensor is outside all layers and named as the logarithm of a policy's standard deviation.
-bool is_deviation(const DeclaredTensor& tensor) {
-  static const std::set<std::string> kNames = {"log_std", "logstd", "log_stds"};
-  const std::string last = tensor.name.substr(tensor.name.rfind('.') + 1);  // npos + 1 is 0
-  if (kNames.count(last) == 1) return true;
-  const std::size_t line = last.rfind('_');
-  return line != std::string::npos && kNames.count(last.substr(line + 1)) == 1;
+/// Returns whether a tensor's name says that it is a policy's standard deviation, or its logarithm: one word of the
+/// last component does, as in log_std_parameter or sigma. Where a tensor of the same name is a mean, it normalizes.
+bool is_deviation(const DeclaredTensor& tensor, const std::vector<DeclaredTensor>& all) {
+  const std::size_t first = tensor.name.rfind('.') + 1;  // npos + 1 is 0
+  for (std::size_t at = first; at < tensor.name.size();) {
+    const std::size_t end = std::min(tensor.name.find('_', at), tensor.name.size());
+    const std::string word = tensor.name.substr(at, end - at);
+    if (word == "std" || word == "stds" || word == "logstd" || word == "sigma") {
+      const std::string mean = tensor.name.substr(0, at) + "mean" + tensor.name.substr(end);
+      return std::none_of(all.begin(), all.end(),
+                          [&mean](const DeclaredTensor& other) { return other.name == mean; });
+    }
+    at = end + 1;
+  }
+  return false;
 }
 
 /// Returns whether tensor `name` belongs to `layer`.
 bool is_of_layer(const std::string& name, const std::string& layer) {
   if (layer.empty()) return name.find('.') == std::string::npos;
   return name.size() > layer.size() && name[layer.size()] == '.' && name.compare(0, layer.size(), layer) == 0;
-}
-
-/// Returns the names of the layers that have matrices, parametrised or not.
-std::vector<std::string> layers_in(const std::vector<DeclaredTensor>& tensors) {
-  std::vector<std::string> layers;
-  for (const DeclaredTensor& tensor : tensors) {
-    if (tensor.shape.size() != 2) continue;
-    const std::string name = tensor.name.substr(0, tensor.name.find(".parametrizations."));
-    const std::size_t end = name.size() < tensor.name.size() ? name.size() : name.rfind('.');
-    layers.push_back(end == std::string::npos ? "" : name.substr(0, end));
-  }
-  return layers;
 }
 
 /// An order may leave out the layers of other modules, but not some layers of a module that it names.
@@ -339,7 +359,7 @@ Weights assemble(const std::vector<DeclaredTensor>& declared, const TensorReader
   for (std::size_t i = 0; i < declared.size(); ++i) {
     if (!is_chosen(declared[i].name)) {
       unused.push_back(declared[i].name + ": of another network, which was not selected");
-    } else if (is_deviation(declared[i])) {
+    } else if (is_deviation(declared[i], declared)) {
       unused.push_back(declared[i].name + ": the deviation of a random policy, not part of its mean");
     } else {
       kept.push_back(i);

@@ -25,8 +25,8 @@ namespace {
 
 [[noreturn]] void refuse_format(const std::string& bytes, const std::string& path) {
   std::string what =
-      "is neither a PyTorch state dict (.pth), safetensors, ONNX, Keras .h5, .npz, .mat, .nnet nor "
-      "generated C weights";
+      "is neither a PyTorch state dict (.pth), safetensors, ONNX, Keras (.h5, .keras), .npz, .mat, "
+      ".nnet nor generated C weights";
   std::string hint = "save one with torch.save(model.state_dict(), ...)";
   if (bytes.empty()) {
     what = "is empty";

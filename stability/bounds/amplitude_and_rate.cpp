@@ -24,9 +24,9 @@ class TotalVariation {
     for (std::size_t i = 0; i < h_.size(); ++i) {
       steps_.insert({h_[i], 2 * weight_[i]});
       lowest_ -= weight_[i];
-      highest_ += weight_[i];
-      low[i] = clip_low();
-      high[i] = clip_high();
+      minus_highest_ -= weight_[i];
+      low[i] = clip(lowest_, true);
+      high[i] = clip(minus_highest_, false);
     }
     std::vector<double> u(h_.size());
     double next = 0;  // after the last value
@@ -38,39 +38,21 @@ class TotalVariation {
   }
 
  private:
-  /// Clips the derivative to at least -1 by removing steps from below; returns the position where it crosses -1.
-  double clip_low() {
-    double at = steps_.empty() ? 0 : steps_.begin()->first;
-    while (lowest_ < -1 && !steps_.empty()) {
-      const auto first = steps_.begin();
-      at = first->first;
-      const double jump = first->second;
-      steps_.erase(first);
-      if (lowest_ + jump > -1) {
-        steps_.insert({at, lowest_ + jump + 1});
-        lowest_ = -1;
-        return at;
-      }
-      lowest_ += jump;
+  /// Clips one end of the derivative to at least -1 by removing steps there; returns the position where it crosses -1.
+  double clip(double& end, bool is_low) {
+    const auto outermost = [&] { return is_low ? steps_.begin() : std::prev(steps_.end()); };
+    double at = steps_.empty() ? 0 : outermost()->first;
+    while (end < -1 && !steps_.empty()) {
+      const auto step = outermost();
+      at = step->first;
+      end += step->second;
+      steps_.erase(step);
+      if (end <= -1) continue;
+      steps_.insert({at, end + 1});
+      end = -1;
+      return at;
     }
-    lowest_ = std::max(lowest_, -1.0);
-    return at;
-  }
-  double clip_high() {
-    double at = steps_.empty() ? 0 : std::prev(steps_.end())->first;
-    while (highest_ > 1 && !steps_.empty()) {
-      const auto last = std::prev(steps_.end());
-      at = last->first;
-      const double jump = last->second;
-      steps_.erase(last);
-      if (highest_ - jump < 1) {
-        steps_.insert({at, 1 - (highest_ - jump)});
-        highest_ = 1;
-        return at;
-      }
-      highest_ -= jump;
-    }
-    highest_ = std::min(highest_, 1.0);
+    end = std::max(end, -1.0);
     return at;
   }
 
@@ -78,7 +60,7 @@ class TotalVariation {
   const std::vector<double>& weight_;
   std::multimap<double, double> steps_;  ///< jumps of the derivative by position
   double lowest_ = -1;
-  double highest_ = 1;
+  double minus_highest_ = -1;
 };
 
 /// Nodes at which u may bend: all of the first ones, then a subset such that about twenty thousand remain.

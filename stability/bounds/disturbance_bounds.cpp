@@ -189,24 +189,12 @@ ClampBounds clamp_demand(const AxisLoop& loop, Channel channel, const Disturbanc
 
 ClampBounds clamp_bounds(const AxisLoop& loop, Channel channel, const Disturbance& disturbance,
                          const OtherErrors& other, double limit_m_s) {
-  ClampBounds result = clamp_demand(loop, channel, disturbance, other, limit_m_s);
-  if (!result.exists) return result;
-  AxisLoop without = loop;
-  without.Ki = 0;
-  const GainNorms pd = continuous_norms(without, channel);
-  const double integral_N = loop.mass_kg * loop.Ki * limit_m_s;
-  const GainNorms pd_command =
-      channel == Channel::kCommand ? pd : continuous_norms(without, Channel::kCommand);
-  const double constant_m =
-      pd_command.amplitude * integral_N + error_parts(without, pd.edge, other).total_m();
-  result.by_amplitude = times_known(pd.amplitude, disturbance.amplitude_N) + constant_m;
-  if (std::isfinite(disturbance.impulse_N_s) && is_stable(without)) {
-    const double felt = disturbance.passes == 1
-                            ? pd.impulse
-                            : felt_passes(disturbance, FadingResponse(impulse_transfer(without, channel)));
-    result.by_impulse = disturbance.impulse_N_s * felt + constant_m;
-  }
-  return result;
+  return clamp_bounds_of(
+      loop, channel, disturbance, other, limit_m_s, [&](const AxisLoop& without, const GainNorms& pd) {
+        return disturbance.passes == 1
+                   ? pd.impulse
+                   : felt_passes(disturbance, FadingResponse(impulse_transfer(without, channel)));
+      });
 }
 
 double staircase_error(const GainNorms& gains, double rate_hz, double latency_s, double rate_of_f_hat_N_s) {

@@ -103,6 +103,25 @@ ClampBounds clamp_bounds(const AxisLoop& loop, Channel channel, const Disturbanc
 /// Returns sup |u| of the commanded force due to a force error, N; for kCommand including the error itself.
 double effort_of_class_N(const AxisLoop& loop, Channel channel, const Disturbance& disturbance);
 
+/// clamp_bounds() of a continuous or sampled loop.
+/// @param felt returns the impulse gain of all passes together of the loop without integral.
+template <class AnyLoop, class Felt>
+ClampBounds clamp_bounds_of(const AnyLoop& loop, Channel channel, const Disturbance& disturbance,
+                            const OtherErrors& other, double limit_m_s, const Felt& felt) {
+  ClampBounds result = clamp_demand(loop, channel, disturbance, other, limit_m_s);
+  if (!result.exists) return result;
+  AnyLoop without = loop;
+  plant_of(without).Ki = 0;
+  const GainNorms pd = norms_of(without, channel);
+  const GainNorms command = channel == Channel::kCommand ? pd : norms_of(without, Channel::kCommand);
+  const double integral_N = plant_of(loop).mass_kg * plant_of(loop).Ki * limit_m_s;
+  const double constant_m = command.amplitude * integral_N + error_parts(without, pd.edge, other).total_m();
+  result.by_amplitude = times_known(pd.amplitude, disturbance.amplitude_N) + constant_m;
+  if (std::isfinite(disturbance.impulse_N_s) && std::isfinite(pd.impulse))
+    result.by_impulse = disturbance.impulse_N_s * felt(without, pd) + constant_m;
+  return result;
+}
+
 /// Returns a bound on sup |e| over all f with |f| <= amplitude and |f'| <= rate, from rest: split_bound() of h on a
 /// grid of `nodes`.
 double amplitude_and_rate_bound(const AxisLoop& loop, Channel channel, double amplitude_N, double rate_N_s,

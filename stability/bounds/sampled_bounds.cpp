@@ -254,26 +254,14 @@ ClampBounds clamp_demand(const SampledLoop& loop, Channel channel, const Disturb
 
 ClampBounds clamp_bounds(const SampledLoop& loop, Channel channel, const Disturbance& disturbance,
                          const OtherErrors& other, double limit_m_s) {
-  ClampBounds result = clamp_demand(loop, channel, disturbance, other, limit_m_s);
-  if (!result.exists) return result;
-  const double mass_kg = loop.plant.mass_kg;
-  SampledLoop without = loop;
-  without.plant.Ki = 0;
-  const SampledAdjoint pd_adjoint(without);
-  if (!pd_adjoint.is_stable()) return result;
-  const GainNorms pd = sampled_norms(without, channel, Instants::kAll);
-  const GainNorms pd_command =
-      channel == Channel::kCommand ? pd : sampled_norms(without, Channel::kCommand, Instants::kAll);
-  const double constant_m = pd_command.amplitude * mass_kg * loop.plant.Ki * limit_m_s +
-                            error_parts(without, pd.edge, other).total_m();
-  result.by_amplitude = times_known(pd.amplitude, disturbance.amplitude_N) + constant_m;
-  if (std::isfinite(disturbance.impulse_N_s)) {
-    result.by_impulse = constant_m + disturbance.impulse_N_s * worst_phase(without, [&](double phase_s) {
-                                       const Kernel kernel = kernel_of(pd_adjoint, channel, phase_s, mass_kg);
-                                       return felt_passes(disturbance, FadingKernel(kernel, kernel.peak));
-                                     });
-  }
-  return result;
+  return clamp_bounds_of(
+      loop, channel, disturbance, other, limit_m_s, [&](const SampledLoop& without, const GainNorms&) {
+        const SampledAdjoint adjoint(without);
+        return worst_phase(without, [&](double phase_s) {
+          const Kernel kernel = kernel_of(adjoint, channel, phase_s, without.plant.mass_kg);
+          return felt_passes(disturbance, FadingKernel(kernel, kernel.peak));
+        });
+      });
 }
 
 }  // namespace swarmcert::stability

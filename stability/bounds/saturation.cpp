@@ -202,15 +202,9 @@ Saturation saturation(const FlownLoop& loop, const DisturbanceSource& source, co
 }
 
 const char* name(Saturation::Verdict verdict) {
-  switch (verdict) {
-    case Saturation::Verdict::kProved:
-      return "proved";
-    case Saturation::Verdict::kRefuted:
-      return "refuted";
-    case Saturation::Verdict::kUndecided:
-      return "undecided";
-  }
-  return "";
+  return verdict == Saturation::Verdict::kProved    ? "proved"
+         : verdict == Saturation::Verdict::kRefuted ? "refuted"
+                                                    : "undecided";
 }
 
 }  // namespace swarmcert::stability

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "nn/base/doubles.h"
 #include "stability/bounds/enclosures/interval_functions.h"
@@ -18,26 +19,15 @@ double plus(double a, double b) { return up(a + b); }
 /// Returns 1/x, rounded up.
 double one_over(double x) { return x > 0 ? up(1 / x) : kInfinity; }
 
-void set_all(double* three, double value) { std::fill(three, three + 3, value); }
+/// Bounds the force along every axis. @param why the rate may be infinite
+void bound_all(double amplitude_N, double rate_N_s, const char* why, EffectBounds& result) {
+  std::fill(result.amplitude_N, result.amplitude_N + 3, amplitude_N);
+  std::fill(result.rate_N_s, result.rate_N_s + 3, rate_N_s);
+  if (std::isinf(amplitude_N) || std::isinf(rate_N_s)) result.unbounded = why;
+}
 
 /// Parameters of a spec by name.
-class Values {
- public:
-  Values(const EffectSpec& spec, const EffectInfo& info) : info_(info), values_(effect_values(info, spec)) {}
-  double operator()(const char* name) const {
-    for (std::size_t i = 0; i < info_.linear.size(); ++i) {
-      if (info_.linear[i].name == name) return values_.linear[i];
-    }
-    for (std::size_t i = 0; i < info_.shape.size(); ++i) {
-      if (info_.shape[i].name == name) return values_.shape[i];
-    }
-    throw std::logic_error(std::string("no parameter ") + name);
-  }
-
- private:
-  const EffectInfo& info_;
-  EffectValues values_;
-};
+using Values = std::function<double(const char*)>;
 
 /// Upper bound on N^(1/p), the ratio of N equal forces composed with the p-norm to one of them.
 double composed(int neighbours, double p) {
@@ -139,13 +129,11 @@ void bound_drag(const std::string& name, const Values& value, const Model& model
     rate = times_up(k, plus(times_up(2 * m.thrust_rate_N_s, m.speed_m_s),
                             times_up(m.largest_thrust_N, m.acceleration_m_s2)));
   }
-  set_all(result.amplitude_N, amplitude);
-  set_all(result.rate_N_s, rate);
-  if (std::isinf(amplitude) || std::isinf(rate)) {
-    result.unbounded = name == "drag_rotor" || name == "inflow"
-                           ? "needs --own-speed, --own-accel and --thrust-rate"
-                           : "needs --own-speed and --own-accel";
-  }
+  const bool needs_thrust = name == "drag_rotor" || name == "inflow";
+  bound_all(
+      amplitude, rate,
+      needs_thrust ? "needs --own-speed, --own-accel and --thrust-rate" : "needs --own-speed and --own-accel",
+      result);
 }
 
 /// Rotors only push: |sum (rotor_k - 1) f_k| <= max |rotor_k - 1| sum f_k. The rate at which thrust moves between
@@ -154,9 +142,8 @@ void bound_rotors(const Values& value, const MotionSet& m, EffectBounds& result)
   double most = 0;
   for (const char* const rotor : {"rotor_1", "rotor_2", "rotor_3", "rotor_4"})
     most = std::max(most, up(std::abs(value(rotor) - 1)));
-  set_all(result.amplitude_N, times_up(most, m.largest_thrust_N));
-  set_all(result.rate_N_s, most == 0 ? 0 : kInfinity);
-  if (most > 0) result.unbounded = "the rate of a single rotor's thrust is not bounded by that of the sum";
+  bound_all(times_up(most, m.largest_thrust_N), most == 0 ? 0 : kInfinity,
+            "the rate of a single rotor's thrust is not bounded by that of the sum", result);
 }
 
 void bound_surface(const std::string& name, const Values& value, const MotionSet& m, EffectBounds& result) {
@@ -168,28 +155,24 @@ void bound_surface(const std::string& name, const Values& value, const MotionSet
                                : std::max(0.0, down(value("height_m") - m.largest_height_m));
   const double g = exp(-(Interval(nearest_m) / Interval(decay_m))).upper;
   const double strength = times_up(value("amplitude"), g);
-  set_all(result.amplitude_N, times_up(strength, m.largest_thrust_N));
-  set_all(result.rate_N_s,
-          times_up(strength, plus(m.thrust_rate_N_s,
-                                  times_up(m.largest_thrust_N, times_up(m.speed_m_s, one_over(decay_m))))));
-  if (std::isinf(result.rate_N_s[2])) result.unbounded = "needs --own-speed and --thrust-rate";
+  const double by_motion = times_up(m.largest_thrust_N, times_up(m.speed_m_s, one_over(decay_m)));
+  bound_all(times_up(strength, m.largest_thrust_N), times_up(strength, plus(m.thrust_rate_N_s, by_motion)),
+            "needs --own-speed and --thrust-rate", result);
 }
 
 /// f = T R w with w fixed in the body: the yaw rate is not declared, so the rate has no bound.
 void bound_tilt(const Values& value, const MotionSet& m, EffectBounds& result) {
   const double x = value("tilt_x_rad"), y = value("tilt_y_rad");
   const double tilt = up(std::sqrt(plus(up(x * x), up(y * y))));
-  set_all(result.amplitude_N, times_up(tilt, m.largest_thrust_N));
-  set_all(result.rate_N_s, tilt == 0 ? 0 : kInfinity);
-  if (tilt > 0) result.unbounded = "turns with the body, whose yaw rate is not bounded";
+  bound_all(times_up(tilt, m.largest_thrust_N), tilt == 0 ? 0 : kInfinity,
+            "turns with the body, whose yaw rate is not bounded", result);
 }
 
 /// The pull is the gradient of a convex function, with slope at most k, and grows with the distance.
 void bound_tether(const Values& value, const MotionSet& m, EffectBounds& result) {
   const double k = value("stiffness_N_m");
-  set_all(result.amplitude_N, k == 0 ? 0 : kInfinity);
-  set_all(result.rate_N_s, times_up(k, m.speed_m_s));
-  if (k > 0) result.unbounded = "the pull grows with the distance from the anchor, which is not bounded";
+  bound_all(k == 0 ? 0 : kInfinity, times_up(k, m.speed_m_s),
+            "the pull grows with the distance from the anchor, which is not bounded", result);
 }
 
 /// f = g T b3 with a factor g that depends on the motion: |(T b3)'| bounds |T'| and T |b3'|; |g'| is bounded per
@@ -223,9 +206,7 @@ void bound_thrust_factor(const std::string& name, const Values& value, const Mod
     change = times_up(value("loss"),
                       plus(rate, times_up(up(kOneOverRootOfE * one_over(value("width_m_s"))), turning)));
   }
-  set_all(result.amplitude_N, amplitude);
-  set_all(result.rate_N_s, change);
-  if (std::isinf(change)) result.unbounded = "needs --own-speed, --own-accel and --thrust-rate";
+  bound_all(amplitude, change, "needs --own-speed, --own-accel and --thrust-rate", result);
 }
 
 /// Bounds functions of the position: their slope times the speed, plus the rate of the thrust.
@@ -272,18 +253,14 @@ void bound_step(const Values& value, EffectBounds& result) {
 EffectBounds truth_bounds(const EffectSpec& effect, const Model& model, const MotionSet& motion) {
   EffectBounds result;
   result.effect = effect.name;
-  const auto nothing_known = [&](const char* why) {
-    set_all(result.amplitude_N, kInfinity);
-    set_all(result.rate_N_s, kInfinity);
-    result.unbounded = why;
-  };
+  const auto nothing_known = [&](const char* why) { bound_all(kInfinity, kInfinity, why, result); };
   if (effect.is_expression()) {
     nothing_known("user-defined formulas have no enclosure");
     return result;
   }
   const std::string& name = effect.name;
   const EffectInfo& info = effect_info(name);
-  const Values value(effect, info);
+  const Values value = [&effect](const char* parameter) { return effect_value(effect, parameter); };
   if (name == "motor_lag" || name == "delay" || name == "thrust_ratio") {
     result.note = "acts through the loop";
   } else if (info.traits.shown_by == ShownBy::kTurning || name == "torque_bias" ||

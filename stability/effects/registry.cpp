@@ -192,4 +192,14 @@ EffectValues effect_values(const EffectInfo& info, const EffectSpec& spec) {
   return {values(info.linear), values(info.shape)};
 }
 
+double effect_value(const EffectSpec& spec, const std::string& name) {
+  const auto stated = spec.parameters.find(name);
+  if (stated != spec.parameters.end()) return stated->second;
+  const EffectInfo& info = effect_info(spec.name);
+  for (const std::vector<Parameter>* const parameters : {&info.linear, &info.shape})
+    for (const Parameter& parameter : *parameters)
+      if (parameter.name == name) return parameter.value;
+  throw std::logic_error(spec.name + " has no parameter " + name);
+}
+
 }  // namespace swarmcert::stability

@@ -63,4 +63,7 @@ struct EffectValues {
 };
 EffectValues effect_values(const EffectInfo& info, const EffectSpec& spec);
 
+/// Returns one parameter of `spec`, or the effect's default. Precondition: the effect has a parameter of this name.
+double effect_value(const EffectSpec& spec, const std::string& name);
+
 }  // namespace swarmcert::stability

@@ -3,13 +3,13 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <map>
 #include <nlopt.hpp>
 
 #include "nn/base/parallel.h"
 #include "nn/base/random.h"
+#include "stability/bounds/saturation.h"
 #include "stability/gains_matrices.h"
 #include "stability/iss/iss_judge.h"
 
@@ -85,33 +85,22 @@ RateDisturbance random_pieces(const IssJudge& judge, bool bang_bang, files::Rand
 IssRun make_run(const IssJudge& judge, int index, std::uint64_t seed) {
   files::Random random(files::Random(seed + 0x1000 + static_cast<std::uint64_t>(index)).bits());
   const int turn = index / 5;
+  constexpr const char* kKinds[] = {"ramp", "worst_linear", "bang_bang", "random", "initial_state"};
   IssRun run;
-  switch (index % 5) {
-    case 0:
-      run.kind = "ramp";
-      append(&run.disturbance, judge.duration_s(), judge.rate_N_s() * direction(turn, random));
-      break;
-    case 1:
-      run.kind = "worst_linear";
-      run.disturbance = worst_linear(judge, direction(turn, random));
-      break;
-    case 2:
-      run.kind = "bang_bang";
-      run.disturbance = random_pieces(judge, true, random);
-      break;
-    case 3:
-      run.kind = "random";
-      run.disturbance = random_pieces(judge, false, random);
-      break;
-    default: {
-      run.kind = "initial_state";
-      run.disturbance = random_pieces(judge, turn % 2 == 0, random);
-      const double size = 0.02 * random.uniform();
-      run.position_m = size * random_direction(random);
-      run.velocity_m_s = 0.05 * random.uniform() * random_direction(random);
-      run.disturbance.bias_W_N =
-          0.05 * judge.mass_kg() * kGravity_m_s2 * random.uniform() * random_direction(random);
-    }
+  run.kind = kKinds[index % 5];
+  if (run.kind == "ramp") {
+    append(&run.disturbance, judge.duration_s(), judge.rate_N_s() * direction(turn, random));
+  } else if (run.kind == "worst_linear") {
+    run.disturbance = worst_linear(judge, direction(turn, random));
+  } else {
+    const bool starts_anywhere = run.kind == "initial_state";
+    run.disturbance = random_pieces(judge, starts_anywhere ? turn % 2 == 0 : run.kind == "bang_bang", random);
+    if (!starts_anywhere) return run;
+    const double size = 0.02 * random.uniform();
+    run.position_m = size * random_direction(random);
+    run.velocity_m_s = 0.05 * random.uniform() * random_direction(random);
+    run.disturbance.bias_W_N =
+        0.05 * judge.mass_kg() * kGravity_m_s2 * random.uniform() * random_direction(random);
   }
   return run;
 }
@@ -214,10 +203,8 @@ std::vector<std::string> IssCheck::why_inconclusive() const {
   }
   const std::string total = std::to_string(runs.size());
   for (const auto& [hypothesis, found] : by_hypothesis) {
-    char time[32];
-    std::snprintf(time, sizeof time, "%.4g", found.second);
     why.push_back("in " + std::to_string(found.first) + " of " + total + " runs " + hypothesis +
-                  ", first after " + time + " s");
+                  ", first after " + decimals(found.second) + " s");
   }
   if (failed > 0)
     why.push_back("the integration failed in " + std::to_string(failed) + " of " + total + " runs");

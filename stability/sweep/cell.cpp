@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "stability/sweep/grid.h"
 
@@ -118,30 +117,17 @@ class Quantities {
 };
 
 std::string limit_text(const GridLimit& limit, double value) {
-  char text[160];
-  if (value < limit.least) {
-    std::snprintf(text, sizeof text, "%s %.4g is below %.4g", limit.quantity.c_str(), value, limit.least);
-  } else {
-    std::snprintf(text, sizeof text, "%s %.4g is above %.4g", limit.quantity.c_str(), value, limit.most);
-  }
-  return text;
+  const bool is_below = value < limit.least;
+  return limit.quantity + " " + decimals(value) + (is_below ? " is below " : " is above ") +
+         decimals(is_below ? limit.least : limit.most);
 }
 
 /// Returns an empty text if the rotors can lift the vehicle.
 std::string lift_text(const FlownLoop& loop) {
   const double weight_N = loop.plant.mass_kg * kGravity_m_s2, most_N = loop.thrust_range_N().upper;
   if (most_N > weight_N) return "";
-  char text[160];
-  std::snprintf(text, sizeof text,
-                "the rotors cannot lift the vehicle: %.4g N of thrust for %.4g N of weight", most_N,
-                weight_N);
-  return text;
-}
-
-std::string thrust_text(double margin_N) {
-  char text[160];
-  std::snprintf(text, sizeof text, "the thrust is %.4g N short under the disturbance", -margin_N);
-  return text;
+  return "the rotors cannot lift the vehicle: " + decimals(most_N) + " N of thrust for " +
+         decimals(weight_N) + " N of weight";
 }
 
 }  // namespace
@@ -168,7 +154,8 @@ Cell compute_cell(const Grid& grid, long index) {
   // All bounds assume that thrust never reaches its limit.
   if (cell.infeasible.empty() && std::isfinite(grid.disturbance.amplitude_N)) {
     const Saturation& thrust = quantities.thrust();
-    if (!thrust.is_proved()) cell.infeasible = thrust_text(thrust.margin_N());
+    if (!thrust.is_proved())
+      cell.infeasible = "the thrust is " + decimals(-thrust.margin_N()) + " N short under the disturbance";
   }
   for (const GridLimit& limit : grid.limits) {
     if (!cell.infeasible.empty()) break;

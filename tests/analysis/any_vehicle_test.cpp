@@ -10,6 +10,7 @@
 #include "analysis/run.h"
 #include "data.h"
 #include "nn/base/json.h"
+#include "nn/base/rotor_speed.h"
 #include "stability/model.h"
 
 namespace swarmcert::tests {
@@ -161,6 +162,42 @@ TEST(ModelDraft, OfAnyNumberOfMotorsIsAModel) {
     const files::Json json = json_of(folder, "compare m.toml one.csv", "compare");
     EXPECT_LT(json["overall"]["nrmse"]["z"].get<double>(), 0.02) << mass << ": of the weight";
   }
+}
+
+constexpr double kLinearShare = 0.6, kSquareShare = 1.6;  // of the weight that a rotor carries
+
+/// A log of 40 s at 100 Hz of a vehicle that moves up and down, with the speeds of its four rotors.
+std::string bouncing_log(double phase) {
+  std::string text = "t,x,y,z,qx,qy,qz,qw,vx,vy,vz,wx,wy,wz,m1_rads,m2_rads,m3_rads,m4_rads,ax,ay,az\n";
+  constexpr double kRate_1_s = 2.5, kRise_m = 0.4;
+  for (int i = 0; i < 4000; ++i) {
+    const double t = 0.01 * i, at = kRate_1_s * t + phase, slow = 0.3 * std::sin(0.31 * t);
+    const double z = 1.5 + kRise_m * std::sin(at) + slow;
+    const double v = kRise_m * kRate_1_s * std::cos(at) + 0.093 * std::cos(0.31 * t);
+    const double a = -kRise_m * kRate_1_s * kRate_1_s * std::sin(at) - 0.02883 * std::sin(0.31 * t);
+    const double load = 1 + a / 9.81;
+    const double speed = kFullRotorSpeed_rad_s *
+                         (std::sqrt(kLinearShare * kLinearShare + 4 * kSquareShare * load) - kLinearShare) /
+                         (2 * kSquareShare);
+    text += fmt::format("{:.2f},0,0,{:.6f},0,0,0,1,0,0,{:.6f},0,0,0", t, z, v);
+    for (int k = 0; k < 4; ++k) text += fmt::format(",{:.3f}", speed);
+    text += fmt::format(",0,0,{:.5f}\n", load * 9.81);
+  }
+  return text;
+}
+
+TEST(ModelDraft, HasTheForceAsAPolynomialOfTheRotorSpeed) {
+  const ScratchFolder folder;
+  write_text(folder / "one.csv", bouncing_log(0));
+  write_text(folder / "two.csv", bouncing_log(1));
+  const Outcome outcome =
+      run_shell("swarmcert model draft one.csv two.csv --mass 0.045 -o m.toml -q", folder.path());
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  const stability::Model model = stability::read_model(folder / "m.toml");
+  ASSERT_TRUE(model.thrust_curve_N.has_value());
+  const double each_N = model.weight_N() / 4;
+  EXPECT_NEAR((*model.thrust_curve_N)[1] / each_N, kLinearShare, 0.05 * kLinearShare);
+  EXPECT_NEAR((*model.thrust_curve_N)[2] / each_N, kSquareShare, 0.05 * kSquareShare);
 }
 
 TEST(Clocks, OffsetsOfLogsWithAbsoluteTimesAreTheDifferencesOfTheirClocks) {

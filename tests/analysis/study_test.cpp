@@ -290,9 +290,13 @@ TEST_F(Study, EveryCommandOfAWalkEndsWithTheNextOne) {
         "compare " + model + " flights", "diagnose " + model + " flights",
         "add drag_linear --model " + model + " flights -o fitted.toml",
         "bound --gains " + gains + " --model " + model,
+        "spacing --max-error 0.1 --steps 3 --gains " + gains + " --model " + model,
+        "tune --nodes 50 --gains " + gains + " --model " + model,
+        "iss-check --runs 5 --gains " + gains + " --model " + model, std::string("demo -o shown"),
         "certify " + net + " --method product --nodes 1 -o cert.json", "check cert.json " + net,
         "export " + net + " --certificate cert.json -o firmware", "match " + net + " firmware"}) {
     const Outcome outcome = run_shell("swarmcert " + words + " -q", folder_.path());
+    EXPECT_NE(outcome.exit_code, 2) << outcome.output;
     EXPECT_NE(outcome.output.find("Next: swarmcert "), std::string::npos) << words << "\n" << outcome.output;
   }
 }

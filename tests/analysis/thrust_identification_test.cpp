@@ -260,6 +260,7 @@ TEST_F(IdentifyThrustCommand, WritesCoefficientsWithIntervals) {
       tests::run_shell("swarmcert identify-thrust cell.csv --json out.json", folder_.path());
   EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
   EXPECT_NE(outcome.output.find("c11 = "), std::string::npos);
+  EXPECT_NE(outcome.output.find("Next: swarmcert compare model.toml"), std::string::npos) << outcome.output;
   const std::string json = tests::read_text(folder_ / "out.json");
   for (const char* part :
        {"\"schema\": \"swarmcert/identify-thrust/1\"", "\"verdict\": \"determined\"", "\"c20\"", "\"d11\"",

@@ -89,7 +89,12 @@ TEST(SweepCommand, ShardsMergeToTheBytesOfAnUndividedRun) {
       EXPECT_NE(early.output.find("are missing"), std::string::npos) << early.output;
     }
   }
+  const Outcome part = run_shell("swarmcert sweep grid.toml -o parts --shard 1/3 --resume", folder.path());
+  EXPECT_NE(part.output.find("Next: swarmcert merge parts"), std::string::npos) << part.output;
   EXPECT_EQ(json_of(folder, "merge parts")["inputs"].size(), 3u);
+  const Outcome merged = run_shell("swarmcert merge parts --force", folder.path());
+  EXPECT_NE(merged.output.find("Next: swarmcert tune --gains gains.toml"), std::string::npos)
+      << merged.output;
   EXPECT_EQ(read_text(folder / "whole/sweep.json"), read_text(folder / "parts/sweep.json"));
   EXPECT_EQ(read_text(folder / "whole/report/report.html"), read_text(folder / "parts/report/report.html"));
   const Json points = files::parse_json(read_text(folder / "whole/sweep.json"), "sweep.json")["points"];

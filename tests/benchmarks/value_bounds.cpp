@@ -20,8 +20,8 @@
 
 #include "data.h"
 #include "lipschitz/certify.h"
+#include "lipschitz/float32_search.h"
 #include "lipschitz/values/float32_error.h"
-#include "lipschitz/values/float32_search.h"
 #include "lipschitz/values/range.h"
 #include "nn/base/random.h"
 #include "nn/random_network.h"

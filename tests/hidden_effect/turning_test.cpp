@@ -24,6 +24,7 @@ const Eigen::Vector3d kTurnedInertia_kg_m2(2.6e-5, 2.6e-5, 4.6e-5);
 struct TurningTruth {
   Eigen::Vector3d change = Eigen::Vector3d::Zero();  ///< of the torque of the rotors
   double flow_N_s = 0, damping_N_m_s = 0, rotor_inertia_kg_m2 = 0;
+  Eigen::Vector4d factors = Eigen::Vector4d::Ones();  ///< of the thrust of each rotor
 };
 
 std::string turned_model() {
@@ -43,7 +44,9 @@ std::string turned_model() {
 /// Body and rotors, with an attitude loop at 1 kHz that follows random attitudes.
 class TurningFlight {
  public:
-  TurningFlight(const TurningTruth& truth, unsigned seed) : truth_(truth), random_(seed) {
+  TurningFlight(const TurningTruth& truth, unsigned seed, double height_m = 1)
+      : truth_(truth), random_(seed) {
+    p_.z() = height_m;
     speed_rad_s_.setConstant(std::sqrt(kTurnedMass_kg * kTurnedG_m_s2 / 4 / kForcePerSquare));
   }
 
@@ -66,7 +69,9 @@ class TurningFlight {
   /// The sum of the speeds, counterclockwise positive.
   double spin() const { return Eigen::Vector4d(1, -1, 1, -1).dot(speed_rad_s_); }
 
-  Eigen::Vector4d forces_N() const { return kForcePerSquare * speed_rad_s_.cwiseAbs2(); }
+  Eigen::Vector4d forces_N() const {
+    return kForcePerSquare * truth_.factors.cwiseProduct(speed_rad_s_.cwiseAbs2());
+  }
 
   Eigen::Vector3d specific_force_B() const {
     return Eigen::Vector3d(0, 0, forces_N().sum() / kTurnedMass_kg);
@@ -155,6 +160,26 @@ files::Json study_of(const TurningTruth& truth) {
   const files::Json ranking = files::read_json(folder / "diagnosed.json", "swarmcert/diagnose/1")["ranking"];
   EXPECT_EQ(turning_of(ranking, "effect"), turning_of(result["causes"], "name"));
   return result;
+}
+
+TEST(Turning, AWeakRotorHasItsFactorFromMeasuredSpeeds) {
+  TurningTruth truth;
+  truth.factors[2] = 0.85;
+  const ScratchFolder folder;
+  for (unsigned run = 1; run <= 5; ++run)
+    write_text(folder / fmt::format("weak_run{}.csv", run), TurningFlight(truth, run, 0.4).log(25));
+  write_text(folder / "model.toml", turned_model());
+  const Outcome outcome = run_shell(
+      "swarmcert add rotor_thrust --model model.toml weak_run*.csv -q -o new.toml --json result.json",
+      folder.path());
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  const files::Json result = files::read_json(folder / "result.json", "swarmcert/add/1");
+  ASSERT_EQ(result["effects"].size(), 1u) << result["ladder"].dump(1);
+  const files::Json& factors = result["effects"][0]["parameters"];
+  for (Eigen::Index k = 0; k < 4; ++k) {
+    // These flights turn all the time: the torques cancel on average only.
+    EXPECT_NEAR(factors[fmt::format("rotor_{}", k + 1)]["value"].get<double>(), truth.factors[k], 0.05) << k;
+  }
 }
 
 const files::Json* cause_named(const files::Json& result, const std::string& name) {

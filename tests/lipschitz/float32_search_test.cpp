@@ -1,5 +1,5 @@
 // The error found by the search is the error of the flight code at the stated points.
-#include "lipschitz/values/float32_search.h"
+#include "lipschitz/float32_search.h"
 
 #include <gmpxx.h>
 #include <gtest/gtest.h>

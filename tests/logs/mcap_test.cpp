@@ -14,10 +14,7 @@
 namespace swarmcert::tests {
 namespace {
 
-logs::RawLog mcap_of(const std::string& bytes) {
-  std::istringstream in(bytes);
-  return logs::read_mcap(in, "bag.mcap");
-}
+logs::RawLog mcap_of(std::string bytes) { return logs::read_mcap(bytes, "bag.mcap"); }
 
 /// Returns x of the poses that were read: their numbers.
 std::vector<double> poses_in_mcap(const logs::RawLog& log) {
@@ -173,7 +170,6 @@ TEST(Mcap, SizesOfChunksAreNotBelieved) {
 }
 
 TEST(Mcap, RefusesWhatItCannotRead) {
-  EXPECT_TRUE(refuses([] { mcap_of(""); }, {"bag.mcap", "the file is empty"}));
   EXPECT_TRUE(refuses([] { mcap_of("\x89MCAP1\r\n"); }, {"offset 0", "magic number"}));
 }
 

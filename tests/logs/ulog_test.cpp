@@ -12,10 +12,7 @@
 namespace swarmcert::tests {
 namespace {
 
-logs::RawLog ulog_of(const std::string& bytes) {
-  std::istringstream in(bytes);
-  return logs::read_ulog(in, "flight.ulg");
-}
+logs::RawLog ulog_of(std::string bytes) { return logs::read_ulog(bytes, "flight.ulg"); }
 
 /// Returns the numbers of the topic "count" that were read.
 std::vector<double> counts_in_ulog(const logs::RawLog& log) { return values_in(log, "count", "number"); }
@@ -178,7 +175,6 @@ TEST(Ulog, OffsetsOfAppendedSectionsAreNotTrusted) {
 }
 
 TEST(Ulog, RefusesWhatItCannotRead) {
-  EXPECT_TRUE(refuses([] { ulog_of(""); }, {"flight.ulg", "the file is empty"}));
   EXPECT_TRUE(refuses([] { ulog_of("ULag\x01\x12\x35 and more"); }, {"offset 0", "magic number", "PX4"}));
   EXPECT_TRUE(
       refuses([] { ulog_of(ulog_head().substr(0, 12)); }, {"offset 12", "ends inside", "copy it again"}));

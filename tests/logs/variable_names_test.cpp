@@ -41,7 +41,7 @@ TEST(ColumnNames, EveryRowOfTheTableIsASignalByItself) {
         for (logs::RawColumn& column : topic.columns) column.values = {1000, 1500, 2000};
       logs::add_own_names(log, notes);
     }
-    const logs::Recognition found = logs::recognise(log, logs::known_columns());
+    const logs::Recognition found = logs::recognise(log, {});
     const logs::Carried* const carried = found.find(row.signal);
     ASSERT_NE(carried, nullptr) << row.names[0];
     for (std::size_t k = 0; k < carried->size(); ++k) EXPECT_GE(carried->columns[k], 0) << row.names[0];
@@ -73,13 +73,13 @@ TEST(ColumnNames, AUnitBehindTheNameCountsOnlyForSignalsOfThatUnit) {
     log.topics.emplace_back();
     log.topics.back().time_s = {0, 0.01, 0.02};
     for (const std::string& name : names) log.topics.back().columns.push_back({name, {0.5, 0.5, 0.5}});
-    return logs::recognise(log, logs::known_columns());
+    return logs::recognise(log, {});
   };
   const logs::Recognition speeds = recognised({"x_mm_s", "y_mm_s", "z_mm_s"});
   EXPECT_EQ(speeds.find(logs::kPosition), nullptr);
   const logs::Recognition places = recognised({"x_cm", "y_cm", "z_cm"});
   ASSERT_NE(places.find(logs::kPosition), nullptr);
-  EXPECT_EQ(places.find(logs::kPosition)->divide, 100);
+  EXPECT_EQ(places.find(logs::kPosition)->factor.divide, 100);
   // The firmware's own names keep their units, whatever their last word.
   const logs::Recognition duties = recognised({"pwm.m1_pwm", "pwm.m2_pwm", "pwm.m3_pwm", "pwm.m4_pwm"});
   ASSERT_NE(duties.find(logs::kDuty), nullptr);

@@ -108,6 +108,38 @@ TEST(FileMeaning, TheDeviationOfAPolicyIsNamedAsUnused) {
   EXPECT_EQ(weights.unused[0].substr(0, 8), "log_std:");
 }
 
+/// A policy and its values, with one more tensor.
+std::string policy_with(const std::string& name) {
+  return state_dict_of({{"actor.0", 3, 2}, {"actor.2", 1, 3}, {"critic.0", 1, 2}},
+                       {{name, "s", 1, {1, 1}, {1, 1}}}, {{"s", raw_numbers<float>({0})}});
+}
+
+TEST(FileMeaning, DeviationsAreKnownByAWordOfTheirName) {
+  for (const char* name : {"actor_logstd", "std", "actor.sigma_param", "actor.log_std_parameter", "sigma"})
+    EXPECT_TRUE(refuses([&] { parse_weights(policy_with(name), "net.pth"); },
+                        {"holds layers of several modules", "--select actor"}))
+        << name;
+}
+
+TEST(FileMeaning, ATensorOfNoLayerPointsToWhatLeavesItOut) {
+  const std::string policy = policy_with("action_scale");
+  EXPECT_TRUE(refuses([&] { parse_weights(policy, "net.pth"); },
+                      {"action_scale", "--select and one of actor, critic"}));
+  EXPECT_EQ(names_of(parse_weights(policy, "net.pth", "", {"actor.0", "actor.2"})), "actor.0,actor.2");
+  const std::string flat =
+      state_dict_of({{"fc1", 3, 2}, {"fc_mean", 1, 3}, {"fc_logstd", 1, 3}},
+                    {{"action_scale", "s", 1, {1, 1}, {1, 1}}}, {{"s", raw_numbers<float>({1})}});
+  EXPECT_TRUE(refuses([&] { parse_weights(flat, "net.pth"); }, {"action_scale", "fc1, fc_mean, fc_logstd"}));
+  EXPECT_EQ(names_of(parse_weights(flat, "net.pth", "", selected({"fc1", "fc_mean"}))), "fc1,fc_mean");
+}
+
+TEST(FileMeaning, AnStdBesideAMeanIsNoDeviation) {
+  const std::string bytes = state_dict_of({{"0", 3, 2}, {"2", 1, 3}},
+                                          {{"obs_std", "s", 1, {1}, {1}}, {"obs_mean", "m", 1, {1}, {1}}},
+                                          {{"s", raw_numbers<float>({1})}, {"m", raw_numbers<float>({0})}});
+  EXPECT_TRUE(refuses([&] { parse_weights(bytes, "net.pth"); }, {"obs_std"}));
+}
+
 std::string safetensors(const std::string& header, const std::vector<float>& numbers) {
   return little_endian(header.size(), 8) + header + raw_numbers(numbers);
 }
@@ -150,6 +182,9 @@ TEST(FileMeaning, ObjectsBesideTheStateDictArePassedOverAndOtherTypesRefused) {
       parse_weights(checkpoint(global_op("pathlib", "PosixPath") + text_op("runs") + "\x85R"), "net.pth")
           .layers.size(),
       2u);
+  const std::string counts = "}(" + text_op("milestones") + integer_op(3) + "u\x85R";
+  EXPECT_EQ(parse_weights(checkpoint(global_op("collections", "Counter") + counts), "net.pth").layers.size(),
+            2u);
   const std::string generator = "\x8a\x10" + std::string(16, '\1');  // 128 bits of a random generator
   EXPECT_EQ(parse_weights(checkpoint(generator), "net.pth").layers.size(), 2u);
   EXPECT_TRUE(refuses(

@@ -346,7 +346,7 @@ def values_are_tight(certificate, net, folder):
     entry, ends = certificate["values"][-1], [("lower", False), ("upper", True)]
     if entry["float32_error"] is not None:
         assert entry["float32_error"] > 0
-        ends.append(("error", True))
+        ends += [("error", True), ("error_in_order", True)]
     tried = Counter()
     for name in entry["networks"]:
         for k in range(len(entry["networks"][name])):
@@ -355,7 +355,7 @@ def values_are_tight(certificate, net, folder):
     if entry["sum"]:
         for key, down in ends:
             tried[key] += refused_one_unit_less(certificate, net, folder, ["sum", key], down)
-    for key in [key for key in ("jump", "float32_error") if entry[key] is not None]:
+    for key in [key for key in ("jump", "float32_error", "float32_error_in_order") if entry[key] is not None]:
         changed = copy(certificate)
         smaller = math.nextafter(entry[key], 0)
         changed["values"][-1].update({key: smaller, key + "_hex": smaller.hex()})

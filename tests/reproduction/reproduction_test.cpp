@@ -35,7 +35,8 @@ TEST_F(Reproduction, SmallExperimentsShowWhatTheyClaim) {
   // Runs the shards one after the other; the last call merges them.
   EXPECT_NE(reproduce("table -o out --shard 1/2").output.find("Part 1/2 is done"), std::string::npos);
   EXPECT_NE(reproduce("table -o out --shard 2/2").output.find("Part 2/2 is done"), std::string::npos);
-  reproduce("table -o out");
+  EXPECT_NE(reproduce("table -o out").output.find("Next: swarmcert reproduce table -o out-full --full"),
+            std::string::npos);
   const Json table = result("table");
   EXPECT_TRUE(table["complete"].get<bool>());
   ASSERT_EQ(table["columns"].size(), 2u);

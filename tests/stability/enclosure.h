@@ -3,7 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <optional>
+
 #include "nn/base/interval.h"
+#include "stability/bounds/enclosures/kernel_cells.h"
+#include "stability/bounds/loops/impulse_response.h"
 
 namespace swarmcert::tests {
 
@@ -19,6 +23,14 @@ inline testing::AssertionResult encloses(const Interval& interval, double value,
   const double width = (interval.upper - interval.lower) / value;
   if (!(width < relative_width)) return testing::AssertionFailure() << "width " << width;
   return testing::AssertionSuccess();
+}
+
+/// The cells of one response without a delay.
+inline std::optional<stability::KernelCells> cells_of(const stability::TransferFunction& y, double cell_s,
+                                                      int count) {
+  const stability::Polynomial denominator = stability::sum(y.denominator, y.feedback);
+  return stability::kernel_cells({y.numerator.begin(), y.numerator.end()},
+                                 {denominator.begin(), denominator.end()}, cell_s, count);
 }
 
 }  // namespace swarmcert::tests

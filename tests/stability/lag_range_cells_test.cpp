@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "nn/base/random.h"
+#include "stability/enclosure.h"
 
 namespace swarmcert::stability {
 namespace {
@@ -85,7 +86,7 @@ TEST(LagRangeCells, AreLittleLargerThanThoseOfTheWorstLag) {
 TEST(LagRangeCells, OfOneLagAreThoseOfItsTransferFunction) {
   for (const Family& family : kFamilies) {
     const auto one = family.cells(0.0575);
-    const auto plain = kernel_cells(family.with(0.0575), kCell_s, kCells);
+    const auto plain = tests::cells_of(family.with(0.0575), kCell_s, kCells);
     ASSERT_TRUE(one && plain);
     EXPECT_TRUE(one->modes.empty());
     EXPECT_NEAR(one->total(), plain->total(), 1e-9 * plain->total());

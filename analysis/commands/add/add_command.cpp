@@ -141,6 +141,17 @@ int show(const AddOptions& options, const CommonOptions& common) {
   return kDone;
 }
 
+/// What was written, and the command to type next.
+void print_end(const Ladder& ladder, const AddOptions& options, const residuals::Inputs& inputs) {
+  if (ladder.any_accepted)
+    fmt::print("Written: {}\nNext: {}\n", options.output,
+               next_command("compare", {options.output}, options.flights, inputs, {"--horizon", "0.5"}));
+  else
+    fmt::print("No effect helped: {} is not written. --keep-anyway writes it nevertheless.\nNext: {}\n",
+               options.output,
+               next_command("diagnose", options.flights.models, options.flights, inputs, {"--next"}));
+}
+
 int climb(const AddOptions& options, const CommonOptions& common) {
   if (options.output.empty()) throw UsageError("add writes a new model: name it with -o");
   if (options.flights.words.empty()) throw UsageError("add needs flights: name logs or folders of them");
@@ -188,13 +199,7 @@ int climb(const AddOptions& options, const CommonOptions& common) {
   }
   if (common.prints_text()) {
     print_ladder(ladder, unit);
-    if (ladder.any_accepted)
-      fmt::print("Written: {}\nNext: {}\n", options.output,
-                 next_command("compare", {options.output}, options.flights, inputs, {"--horizon", "0.5"}));
-    else
-      fmt::print("No effect helped: {} is not written. --keep-anyway writes it nevertheless.\nNext: {}\n",
-                 options.output,
-                 next_command("diagnose", options.flights.models, options.flights, inputs, {"--next"}));
+    print_end(ladder, options, inputs);
   }
   std::vector<LadderOfModel> ladders;
   if (!ladder.earlier.empty())

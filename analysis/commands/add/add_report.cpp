@@ -44,7 +44,8 @@ void add_ladder_figure(Report& report, const std::vector<stability::LadderRow>& 
   report.figure(
       name, data,
       fmt::format("set style data histograms\nset style fill solid 0.9 noborder\nset boxwidth 0.9\n"
-                  "set ylabel 'RMSE of the {} [{}]'\nset yrange [0:*]\nset xtics rotate by -30\n{}\n",
+                  "set ylabel 'RMSE of the {} [{}]'\nset yrange [0:*]\n"
+                  "set xtics rotate by (exists('narrow') ? -90 : -30)\n{}\n",
                   what_rows_measure(rows), force.name, plots),
       "Error ladder: how the error of the force falls from the nominal model on, effect by effect, on the "
       "fitted, the selecting and the test flights.");

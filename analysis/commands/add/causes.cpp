@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "stability/effects/registry.h"
+#include "stability/effects/words.h"
 
 namespace swarmcert::analysis {
 namespace {
@@ -28,54 +29,11 @@ std::vector<const EffectSpec*> added_by(const LadderRow& row, const LadderRow& b
   return added.empty() ? changed : added;
 }
 
-/// An effect in plain words, if the leading parameter is not zero; {name} stands for the value of a parameter.
-struct Phrase {
-  const char *effect, *leading;
-  const char* text;
-  const char* if_negative;  ///< with the leading parameter's size; null: `text`
-};
-constexpr Phrase kPhrases[] = {
-    {"wind_field", "thermal_N", "an updraft of {thermal_N} at x {x_m}, y {y_m}, radius {radius_m}",
-     "a downdraft of {thermal_N} at x {x_m}, y {y_m}, radius {radius_m}"},
-    {"wind_field", "shear_x_N", "a wind of ({shear_x_N}, {shear_y_N}) above {height_m}", nullptr},
-    {"constant_force", "force_x_N", "a steady force of ({force_x_N}, {force_y_N}, {force_z_N})", nullptr},
-    {"drag_linear", "drag_N_s_m", "a drag of {drag_N_s_m} times the velocity", nullptr},
-    {"motor_lag", "tau_s", "rotors that follow their commands with a lag of {tau_s}", nullptr},
-    {"delay", "delay_s", "commands that act {delay_s} late", nullptr},
-    {"payload_step", "time_s", "a load that changes from {mass_before_kg} to {mass_after_kg} at {time_s}",
-     nullptr}};
-
-/// "35.2 mN", "0.31 m": the unit is the end of the name.
-std::string quantity(const std::string& name, double value, const residuals::ForceUnit& force) {
-  const std::pair<const char*, const char*> kUnits[] = {
-      {"_N_s_m", "N s/m"}, {"_N", ""}, {"_kg", "kg"}, {"_m", "m"}, {"_s", "s"}};
-  for (const auto& [end, unit] : kUnits) {
-    const std::string tail = end;
-    if (name.size() < tail.size() || name.compare(name.size() - tail.size(), tail.size(), tail) != 0)
-      continue;
-    if (tail == "_N") return fmt::format("{:.3g} {}", value * force.per_newton(), force.name);
-    return fmt::format("{:.3g} {}", value, unit);
-  }
-  return fmt::format("{:.3g}", value);
-}
-
-std::string plain_words(const Cause& cause, const residuals::ForceUnit& force) {
-  for (const Phrase& phrase : kPhrases) {
-    const auto leading = cause.parameters.find(phrase.leading);
-    if (cause.name != phrase.effect || leading == cause.parameters.end() || leading->second.value == 0)
-      continue;
-    const bool is_negative = leading->second.value < 0 && phrase.if_negative != nullptr;
-    std::string text = is_negative ? phrase.if_negative : phrase.text;
-    for (const auto& [name, value] : cause.parameters) {
-      const bool is_size = is_negative && name == phrase.leading;
-      const std::string token = "{" + name + "}";
-      const std::size_t at = text.find(token);
-      if (at != text.npos)
-        text.replace(at, token.size(), quantity(name, is_size ? -value.value : value.value, force));
-    }
-    return text + "; ";
-  }
-  return "";
+std::string plain_words(const Cause& cause, const residuals::ForceUnit& unit) {
+  std::map<std::string, double> values;
+  for (const auto& [name, value] : cause.parameters) values[name] = value.value;
+  const std::string words = stability::in_words(cause.name, values, {unit.per_newton(), unit.name});
+  return words.empty() ? "" : words + "; ";
 }
 
 std::string equation_of(const EffectSpec& spec) {

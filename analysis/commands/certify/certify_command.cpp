@@ -195,11 +195,12 @@ void add_ranges(const files::Network& network, const CertifyOptions& options, Pr
   const lipschitz::Domain domain =
       options.domain.empty() ? lipschitz::clamp_domain(network) : options.certify.domain;
   if (domain.empty()) throw UsageError("--range needs a box: give --domain, or a clamp in network.toml");
-  std::map<files::FunctionId, double> bounds;
+  std::map<files::FunctionId, double> bounds, slopes;
   std::map<std::string, double> rho_bounds;
   for (const CertifiedBound& bound : output.found.bounds) {
     if (bound.block != "all" || !bound.scale.empty() || !bound.neighbours.empty()) continue;
     bounds[bound.function] = bound.upper.value();
+    if (bound.domain == "global") slopes[bound.function] = bound.upper.value();
     if (bound.function.is_rho()) rho_bounds[bound.function.kind()] = bound.upper.value();
   }
   lipschitz::RangeOptions range;
@@ -215,9 +216,11 @@ void add_ranges(const files::Network& network, const CertifyOptions& options, Pr
   const bool is_float32 = std::all_of(parts.begin(), parts.end(), [](const auto& part) {
     return part.second->precision == files::Precision::kFloat32 && part.second->is_relu();
   });
-  output.found.values =
-      lipschitz::certified_values(network, domain, rho_bounds,
-                                  {range.neighbours, options.domain.empty(), is_float32, options.input_step});
+  lipschitz::ValueOptions values{
+      range.neighbours, options.domain.empty(), is_float32, options.input_step, {}, slopes};
+  for (const lipschitz::CertifiedLayer& layer : output.found.layers)
+    values.norms[layer.network].push_back(layer.norm.norm.upper.value());
+  output.found.values = lipschitz::certified_values(network, domain, rho_bounds, values);
   if (!is_float32) return;  // the vehicle has other weights (--as float32), or functions of unknown rounding
   lipschitz::Float32Options float32;
   float32.neighbours = range.neighbours;

@@ -296,10 +296,11 @@ void print_ranges(const files::Network& network, const CertifyOutput& output) {
     fmt::print("  {}{}: {:.4g} (arithmetic {:.4g}, conversion of the inputs {:.4g})", error.function.name(),
                many, error.total.value(), error.evaluation.value(), error.inputs.value());
     const auto* const stated = in_certificate(output, error.function, error.neighbours_at_most);
-    fmt::print("{}\n",
-               stated != nullptr && stated->float32_error
-                   ? fmt::format("; in the certificate, for any order: {:.4g}", *stated->float32_error)
-                   : "");
+    fmt::print("{}\n", stated != nullptr && stated->float32_error[check::kInOrder]
+                           ? fmt::format("; in the certificate: {:.4g}, and for any order {:.4g}",
+                                         *stated->float32_error[check::kInOrder],
+                                         *stated->float32_error[check::kAnyOrder])
+                           : "");
   }
 }
 

@@ -243,8 +243,13 @@ void describe_float32(Record& record, const Float32Row& row) {
   record.field("inputs", row.error.inputs.value(), "Of the conversion of the inputs.", "",
                "proved upper bound");
   record.constant("arithmetic", "float32 against exact", "");
-  record.field("bound_in_certificate", row.stated != nullptr ? row.stated->float32_error : std::nullopt,
-               "What the certificate states, for any order of summation; null: nothing.");
+  const auto stated = [&row](check::Summation summation) {
+    return row.stated != nullptr ? row.stated->float32_error[summation] : std::nullopt;
+  };
+  record.field("bound_in_certificate", stated(check::kInOrder),
+               "What the certificate states for the order of summation of the exported code; null: nothing.");
+  record.field("bound_in_certificate_any_order", stated(check::kAnyOrder),
+               "What it states for any order, with or without fused multiply-adds.");
 }
 
 /// The files on which the result depends, without duplicates.

@@ -152,6 +152,7 @@ int run_demo(const DemoOptions& options, const CommonOptions& common) {
   const std::string certify_page = certify_network(network, arguments.file, folder, common, say, result);
   const std::string study_page = study_flights(folder, common, say, result);
   say(fmt::format("Look at {} and {}.", certify_page, study_page));
+  print_next(common, {"inspect", (folder / "flights" / "1" / "cf1_00").string()});
   write_result(common, result_of("demo", input_files(network), std::nullopt, result));
   return result.accepted ? kDone : kViolated;
 }

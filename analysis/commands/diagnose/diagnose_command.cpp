@@ -98,6 +98,32 @@ residuals::FailingPlace where_it_fails(const residuals::Inputs& inputs, const Co
   return residuals::failing_place(residuals::compare(inputs, common.jobs, show), unit);
 }
 
+/// The flights of --against, with labels and clocks set right.
+residuals::Inputs corrected_others(const DiagnoseOptions& options, const residuals::Inputs& inputs,
+                                   const CommonOptions& common) {
+  residuals::Inputs others = read_others(options.flights, options.against, inputs);
+  identification::find_and_correct_labels(others, common.jobs);
+  identification::find_and_correct_clocks(others, common.jobs);
+  return others;
+}
+
+/// The command to type after a verdict on the flights of one kind.
+std::string next_of(identification::Verdict verdict, const FlightOptions& flights,
+                    const residuals::Inputs& inputs) {
+  const std::string& model = inputs.models[0].path;
+  if (verdict == identification::Verdict::kMissingEffect || verdict == identification::Verdict::kUnexplained)
+    return next_command("add", {"auto", "--model", model}, flights, inputs, {"-o", "fitted.toml"});
+  return next_command("compare", {model}, flights, inputs, {"--json", "errors.json"});
+}
+
+std::vector<std::string> notes_of(const std::vector<identification::Mislabelled>& labels,
+                                  const std::vector<identification::ClockOffset>& clocks) {
+  std::vector<std::string> notes;
+  for (const identification::Mislabelled& label : labels) notes.push_back(sentence(label));
+  for (const identification::ClockOffset& clock : clocks) notes.push_back(sentence(clock));
+  return notes;
+}
+
 int run_diagnose(const DiagnoseOptions& options, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
   refuse_folder(common, options.report);
@@ -110,9 +136,7 @@ int run_diagnose(const DiagnoseOptions& options, const CommonOptions& common) {
   std::vector<std::string> files = inputs.files(), other_files;
   std::optional<residuals::Inputs> others;
   if (!options.against.empty()) {
-    others = read_others(options.flights, options.against, inputs);
-    identification::find_and_correct_labels(*others, common.jobs);
-    identification::find_and_correct_clocks(*others, common.jobs);
+    others = corrected_others(options, inputs, common);
     other_files = add_files_of(*others, files);
   }
   Answers answers = answer(options, common, inputs, others ? &*others : nullptr);
@@ -147,22 +171,12 @@ int run_diagnose(const DiagnoseOptions& options, const CommonOptions& common) {
   const files::Node document = result_of("diagnose", files, std::nullopt, result);
   write_result(common, document);
   if (prints) fmt::print("verdict: {}\n", name(judgement.verdict));
-  const bool has_more = judgement.verdict == identification::Verdict::kMissingEffect ||
-                        judgement.verdict == identification::Verdict::kUnexplained;
-  if (prints && !others && inputs.models.size() == 1) {
-    const std::string& model = inputs.models[0].path;
-    fmt::print("Next: {}\n", has_more ? next_command("add", {"auto", "--model", model}, options.flights,
-                                                     inputs, {"-o", "fitted.toml"})
-                                      : next_command("compare", {model}, options.flights, inputs,
-                                                     {"--json", "errors.json"}));
-  }
+  if (prints && !others && inputs.models.size() == 1)
+    fmt::print("Next: {}\n", next_of(judgement.verdict, options.flights, inputs));
   if (!options.report.empty()) {
-    std::vector<std::string> notes;
-    for (const identification::Mislabelled& label : labels) notes.push_back(sentence(label));
-    for (const identification::ClockOffset& clock : clocks) notes.push_back(sentence(clock));
     const std::string path =
-        write_diagnose_report(answers.diagnoses, answers.differences, answers.each, notes, unit,
-                              to_json(document), options.report, common.force);
+        write_diagnose_report(answers.diagnoses, answers.differences, answers.each, notes_of(labels, clocks),
+                              unit, to_json(document), options.report, common.force);
     if (prints) fmt::print("Report: {}\n", path);
   }
   if (judgement.verdict != identification::Verdict::kInconclusive) return kDone;

@@ -144,6 +144,10 @@ int run_identify_thrust(const IdentifyThrustOptions& options, const CommonOption
     const std::string path = write_thrust_report(data, result, node, options.report, common.force);
     if (common.prints_text()) fmt::print("\nreport: {}\n", path);
   }
+  if (described.is_determined()) {
+    if (common.prints_text()) fmt::print("\nWrite c00 .. c11 into [vehicle.thrust] of model.toml; then:\n");
+    print_next(common, {"compare", "model.toml", "flights"});
+  }
   return described.is_determined() ? kDone : kInconclusive;
 }
 

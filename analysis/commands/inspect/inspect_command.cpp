@@ -180,6 +180,15 @@ void write_draft(InspectOptions& options, const CommonOptions& common) {
   }
 }
 
+void print_next_of_logs(const InspectOptions& options, const CommonOptions& common) {
+  std::vector<std::string> next = {"model", "draft"};
+  next.insert(next.end(), options.files.begin(), options.files.end());
+  if (!options.columns.empty()) next.insert(next.end(), {"--columns", options.columns});
+  next.insert(next.end(), {"-o", "model.toml"});
+  if (common.prints_text()) fmt::print("With a model of the vehicle, 'swarmcert study' says what it lacks. ");
+  print_next(common, next);
+}
+
 int run_inspect(InspectOptions options, const CommonOptions& common) {
   if (!options.csv.empty()) {
     if (options.files.size() != 1 || !logs::looks_like_log(options.files[0]))
@@ -235,15 +244,7 @@ int run_inspect(InspectOptions options, const CommonOptions& common) {
     if (common.prints_text()) fmt::print("Report: {}\n", page);
   }
   write_result(common, described);
-  if (!outcomes.empty() && outcomes.size() == num_readable) {
-    std::vector<std::string> next = {"model", "draft"};
-    next.insert(next.end(), options.files.begin(), options.files.end());
-    if (!options.columns.empty()) next.insert(next.end(), {"--columns", options.columns});
-    next.insert(next.end(), {"-o", "model.toml"});
-    if (common.prints_text())
-      fmt::print("With a model of the vehicle, 'swarmcert study' says what it lacks. ");
-    print_next(common, next);
-  }
+  if (!outcomes.empty() && outcomes.size() == num_readable) print_next_of_logs(options, common);
   return num_readable == paths.size() ? kDone : kBadInput;
 }
 

@@ -299,6 +299,12 @@ int run_iss_check(IssCheckOptions options, const CommonOptions& common) {
     const std::string path = write_iss_check_report(check, described, options.report, common.force);
     if (common.prints_text()) fmt::print("report: {}\n", path);
   }
+  const bool is_open = check.is_refuted() || !check.why_inconclusive().empty();
+  print_next(common,
+             is_open ? std::vector<std::string>{"bound", "--gains", options.gains, "--model", options.model,
+                                                "--details"}
+                     : std::vector<std::string>{"simulate", "random-walk", "--vehicles", "2", "--gains",
+                                                options.gains, "--model", options.model, "-o", "flights"});
   if (check.is_refuted()) return kViolated;
   return check.why_inconclusive().empty() ? kDone : kInconclusive;
 }

@@ -64,7 +64,7 @@ int run_model(const ModelOptions& options, const CommonOptions& common) {
                                : options.base;
   inputs.push_back(base);
   const logs::SignalMap map =
-      options.columns.empty() ? logs::known_columns() : logs::read_columns(options.columns);
+      options.columns.empty() ? logs::SignalMap() : logs::read_columns(options.columns);
   const ModelResult result = {identification::draft_model(found, map, masses_kg, options.mass_kg,
                                                           options.keep, stability::read_model(base))};
   const identification::ModelDraft& draft = result.draft;

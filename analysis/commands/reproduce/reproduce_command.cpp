@@ -107,6 +107,19 @@ void describe_any(files::Record& record) {
   }
 }
 
+/// Returns the words of the same experiment, undivided, into `output`.
+std::vector<std::string> same_experiment(const ReproduceOptions& options, bool full,
+                                         const std::string& output) {
+  const reproduction::Setting& setting = options.setting;
+  std::vector<std::string> words = {"reproduce", options.name, "-o", output};
+  if (full) words.push_back("--full");
+  if (setting.updraft) words.push_back("--updraft");
+  if (!setting.recorded.empty()) words.insert(words.end(), {"--recorded", setting.recorded});
+  if (setting.seed != reproduction::Setting().seed)
+    words.insert(words.end(), {"--seed", std::to_string(setting.seed)});
+  return words;
+}
+
 int run_reproduce(ReproduceOptions options, const CommonOptions& common) {
   const Experiment& chosen = experiment(options.name);
   options.setting.shard = parse_shard(options.shard);
@@ -154,14 +167,16 @@ int run_reproduce(ReproduceOptions options, const CommonOptions& common) {
   write_result(common, result);
   if (common.prints_text()) print(finding);
   if (is_part) {
-    if (common.prints_text())
-      fmt::print("Part {} is done. When all parts are, the same command without --shard merges them.\n",
-                 options.shard);
+    if (common.prints_text()) fmt::print("Part {} is done. When all parts are, merge them.\n", options.shard);
+    print_next(common, same_experiment(options, setting.full, options.output));
     return kDone;
   }
   const std::string report = write_report(options, finding);
   files::write_file(result_file.string(), files::to_text(files::to_json(result)), true);
   if (common.prints_text()) fmt::print("Report: {}\nNumbers: {}\n", report, result_file.string());
+  const bool has_sizes = setting.calibrate.empty();  // what was recorded has one size
+  if (!setting.full && has_sizes)
+    print_next(common, same_experiment(options, true, options.output + "-full"));
   return kDone;
 }
 

@@ -26,7 +26,6 @@ struct SpacingOptions {
 
 /// The field of `neighbour` as stated by `model`, or the published fit of the effect if the model has no downwash.
 DownwashField field_of(const stability::Model& model, double neighbour_mass_kg, std::string& source) {
-  const stability::EffectInfo& info = stability::effect_info("downwash");
   stability::EffectSpec spec;
   spec.name = "downwash";
   source = "published fit, " + model.path + " has no downwash";
@@ -36,20 +35,14 @@ DownwashField field_of(const stability::Model& model, double neighbour_mass_kg, 
       source = model.path;
     }
   }
-  const stability::EffectValues values = effect_values(info, spec);
-  const auto shape = [&](const char* name) {
-    for (std::size_t i = 0; i < info.shape.size(); ++i) {
-      if (info.shape[i].name == name) return values.shape.at(i);
-    }
-    throw std::logic_error(std::string("downwash has no parameter ") + name);
-  };
+  const auto value = [&spec](const char* name) { return effect_value(spec, name); };
   DownwashField field;
   field.amplitude_N =
-      std::abs(values.linear.at(0)) * std::pow(neighbour_mass_kg / 0.034, shape("mass_exponent"));
-  field.decay = shape("decay_exponent");
-  field.spread_m = shape("spread_m");
-  field.spread_slope = shape("spread_slope");
-  field.tail = shape("tail");
+      std::abs(value("amplitude_N")) * std::pow(neighbour_mass_kg / 0.034, value("mass_exponent"));
+  field.decay = value("decay_exponent");
+  field.spread_m = value("spread_m");
+  field.spread_slope = value("spread_slope");
+  field.tail = value("tail");
   return field;
 }
 
@@ -161,6 +154,8 @@ int run_spacing(const SpacingOptions& options, const CommonOptions& common) {
   if (common.prints_text()) {
     print_spacing(result, described);
     if (!report.empty()) fmt::print("report: {}\n", report);
+    print_next(common, {"simulate", "swap", "--vehicles", "2", "--gains", options.tracking.gains, "--model",
+                        options.tracking.model, "-o", "flights"});
   }
   return kDone;
 }

@@ -10,6 +10,7 @@
 #include "analysis/commands/shared/shard_option.h"
 #include "analysis/commands/sweep/sweep_report.h"
 #include "nn/base/file_io.h"
+#include "nn/base/input_error.h"
 #include "stability/sweep/shards.h"
 
 namespace swarmcert::analysis {
@@ -41,6 +42,18 @@ void describe(files::Record& record, const SweepResult& result) {
                     [&](files::Record& all) { describe(all, result.sweep.value_or(MergedSweep())); });
 }
 
+/// A grid gives a picture, `tune` the best gains between its values. Shards may be merged where the grid is not: then
+/// there is no next command.
+void print_next_of(const std::string& grid_path, const CommonOptions& common) {
+  try {
+    const stability::Grid grid = stability::load_grid(grid_path);
+    print_next(common, {"tune", "--gains", grid.gains.path, "--model", grid.model.path, "--axis",
+                        std::string(1, "xyz"[grid.axis])});
+  } catch (const files::InputError&) {
+    return;
+  }
+}
+
 /// Writes FOLDER/sweep.json and the report; the last step of both commands.
 int finish(const std::string& command, const std::string& folder, const std::string& report_wanted,
            const std::vector<std::string>& inputs, const CommonOptions& common, bool may_replace) {
@@ -55,6 +68,7 @@ int finish(const std::string& command, const std::string& folder, const std::str
   if (!common.prints_text()) return kDone;
   print_sweep(sweep);
   fmt::print("\npoints: {}\nreport: {}\n", path, report);
+  print_next_of(sweep.grid.path, common);
   return kDone;
 }
 
@@ -85,8 +99,8 @@ int run_sweep(const SweepOptions& options, const CommonOptions& common) {
     return finish("sweep", options.folder, options.report, grid.inputs, common, options.resume);
   write_result(common, result_of("sweep", grid.inputs, std::nullopt, SweepResult{std::nullopt, outcome}));
   if (common.prints_text()) {
-    fmt::print("{} cells in {}\nwhen all shards are there: swarmcert merge {}\n", outcome.done, outcome.file,
-               options.folder);
+    fmt::print("{} cells in {}; when all shards are there, merge them.\n", outcome.done, outcome.file);
+    print_next(common, {"merge", options.folder});
   }
   return kDone;
 }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <utility>
 
 #include "analysis/cli/counted.h"
 #include "analysis/report/report.h"
@@ -119,15 +120,35 @@ Plane plane_of(const MergedSweep& sweep, std::size_t quantity) {
   return plane;
 }
 
-/// Returns whether the values are positive and span more than a decade.
-bool spans_decades(const MergedSweep& sweep, std::size_t quantity) {
-  double least = INFINITY, most = 0;
+/// Returns the least and the largest value of the feasible cells.
+std::pair<double, double> range_of(const MergedSweep& sweep, std::size_t quantity) {
+  double least = INFINITY, most = -INFINITY;
   for (const Cell& cell : sweep.cells) {
     if (!cell.infeasible.empty() || !std::isfinite(cell.values[quantity])) continue;
     least = std::min(least, cell.values[quantity]);
     most = std::max(most, cell.values[quantity]);
   }
-  return least > 0 && most > 10 * least;
+  return {least, most};
+}
+
+/// A logarithmic axis of gnuplot with marks at 1, 2, 5, 10, ... or, over more than three decades, at powers of ten.
+std::string log_axis(const std::string& axis, double from, double to) {
+  std::string marks;
+  for (double decade = std::pow(10, std::floor(std::log10(from))); decade <= to; decade *= 10) {
+    for (const double mark : {decade, 2 * decade, 5 * decade}) {
+      const bool is_shown = mark >= from && mark <= to && (mark == decade || to < 1000 * from);
+      if (is_shown) marks += fmt::format("{}{:.6g}", marks.empty() ? "" : ", ", mark);
+    }
+  }
+  return fmt::format("set logscale {0}\nset {0}tics ({1})\n", axis, marks);
+}
+
+/// Returns the name of a parameter with its unit.
+std::string axis_label(const std::string& name) {
+  static const std::map<std::string, std::string> units = {
+      {"Kp", "1/s^2"}, {"Kd", "1/s"}, {"Ki", "1/s^3"}, {"Lambda", "1/s"}, {"K", "kg/s"}};
+  const auto unit = units.find(name);  // the other names state theirs
+  return unit == units.end() ? name : name + " [" + unit->second + "]";
 }
 
 /// Draws every feasible cell in the colour of its value, over grey for the infeasible ones, with the Pareto front as
@@ -147,8 +168,10 @@ std::string heat_map(const MergedSweep& sweep, const Plane& plane, std::size_t q
     script += fmt::format("set {}range [{:.10g}:{:.10g}]\n", names[k], edges.front(), edges.back());
     place += fmt::format("{}{:.10g}", k > 0 ? "," : "", at);
   }
-  if (spans_decades(sweep, quantity)) script += "set logscale cb\n";
-  script += "set label 1 '' at " + place + " front point pointtype 3 linecolor rgb 'white'\n";
+  const auto [least, most] = range_of(sweep, quantity);
+  if (least > 0 && most > 10 * least) script += log_axis("cb", least, most);
+  script += "set label 1 '' at " + place +
+            " front point pointtype 3 pointsize 1.5 linewidth 2 linecolor rgb 'white'\n";
   return script + "plot '" + file +
          ".dat' using 1:2:3:4:5:6:7 with boxxyerror fillcolor palette, '' using ($8 > 0 ? $1 : NaN):2 "
          "with points pointtype 6 pointsize 0.4 linecolor rgb 'white'\n";
@@ -163,12 +186,14 @@ void add_plane(Report& report, const MergedSweep& sweep, std::size_t quantity) {
   const std::string label = name + " [" + unit_of(name) + "]";
   const bool is_map = plane.axes.size() > 1;
   std::string script = "set key off\nset title " + plot_string(meaning(name)) + "\nset xlabel " +
-                       plot_string(sweep.grid.axes[plane.axes[0]].name) + "\nset " + (is_map ? "cb" : "y") +
-                       "label " + plot_string(label) + "\n";
-  if (is_geometric(sweep.grid.axes[plane.axes[0]].values)) script += "set logscale x\n";
+                       plot_string(axis_label(sweep.grid.axes[plane.axes[0]].name)) + "\nset " +
+                       (is_map ? "cb" : "y") + "label " + plot_string(label) + "\n";
+  for (std::size_t k = 0; k < plane.axes.size(); ++k) {
+    const std::vector<double>& values = sweep.grid.axes[plane.axes[k]].values;
+    if (is_geometric(values)) script += log_axis(k == 0 ? "x" : "y", values.front(), values.back());
+  }
   if (is_map) {
-    if (is_geometric(sweep.grid.axes[plane.axes[1]].values)) script += "set logscale y\n";
-    script += "set ylabel " + plot_string(sweep.grid.axes[plane.axes[1]].name) +
+    script += "set ylabel " + plot_string(axis_label(sweep.grid.axes[plane.axes[1]].name)) +
               "\nif (exists('narrow')) { set lmargin at screen 0.22 }\n" +
               heat_map(sweep, plane, quantity, file);
   } else {

@@ -253,6 +253,14 @@ void describe(files::Record& record, const TuneOutcome& outcome) {
   record.field("stopped", found.stopped, "Why the search ended.");
 }
 
+/// Gains that were found are to be judged with all axes together; if none were, the bounds show what limits them.
+void print_next_of(const TuneOptions& options, const TuneResult& found, const CommonOptions& common) {
+  const std::string& gains = options.tracking.gains;
+  if (common.prints_text() && found.best.feasible)
+    fmt::print("Write the gains of axis {} into {}; then:\n", options.axis, gains);
+  print_next(common, {"bound", "--gains", gains, "--model", options.tracking.model, "--details"});
+}
+
 int run_tune(TuneOptions options, const CommonOptions& common) {
   refuse_to_replace(common, common.json);
   refuse_folder(common, options.report);
@@ -281,6 +289,7 @@ int run_tune(TuneOptions options, const CommonOptions& common) {
         options.report, common.force);
     if (common.prints_text()) fmt::print("report: {}\n", path);
   }
+  print_next_of(options, found, common);
   if (!found.best.feasible) return found.infeasible.empty() ? kInconclusive : kViolated;
   return kDone;
 }

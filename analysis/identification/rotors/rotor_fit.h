@@ -28,7 +28,8 @@ RotorFactors rotor_factors(const std::vector<RotorLoads>& flights, const std::ve
 double rotor_imbalance_N(const std::vector<RotorLoads>& flights, const RotorFactors& factors);
 
 /// Returns rotor_thrust for the model of `kind`, fitted to the flights `which`. The true forces carry the weight,
-/// reduced by the model's own thrust_ratio. Empty if no flight has three seconds of slow flight with four duties.
+/// reduced by the model's own thrust_ratio. Empty if no flight has three seconds of slow flight with the forces of four
+/// rotors.
 std::vector<Missing> fit_rotors(const residuals::Inputs& inputs, const std::string& kind,
                                 const std::vector<int>& which, int jobs);
 

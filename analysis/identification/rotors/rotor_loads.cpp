@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "analysis/residuals/over_tracks.h"
+#include "analysis/residuals/torque_residual.h"
 
 namespace swarmcert::identification {
 namespace {
@@ -19,7 +20,28 @@ void summarize(const std::vector<Eigen::Vector4d>& blocks, RotorLoads& loads) {
   loads.error_N = (squares / (count * std::max(count - 1, 1.0))).cwiseSqrt();
 }
 
-RotorLoads loads_of(const Track& track, const stability::Model& model) {
+/// Returns which rotor of the model stands front right, back right, back left and front left; empty unless there are
+/// four, one in each quadrant, and those on the diagonal through front right turn counterclockwise: `rotor_thrust`
+/// assumes such a vehicle.
+std::vector<std::size_t> rotors_in_order(const stability::Model& model) {
+  constexpr double kSides[4][2] = {{1, -1}, {-1, -1}, {-1, 1}, {1, 1}};
+  const std::vector<stability::RotorPlace> places = stability::rotor_places(model);
+  std::vector<std::size_t> order;
+  if (places.size() != 4) return order;
+  for (std::size_t k = 0; k < 4; ++k) {
+    const auto is_there = [&](const stability::RotorPlace& place) {
+      return place.x_m * kSides[k][0] > 0 && place.y_m * kSides[k][1] > 0 &&
+             place.counterclockwise == (k % 2 == 0);
+    };
+    const auto found = std::find_if(places.begin(), places.end(), is_there);
+    if (found == places.end()) return {};
+    order.push_back(static_cast<std::size_t>(found - places.begin()));
+  }
+  return order;
+}
+
+RotorLoads loads_of(const Track& track, const stability::Model& model,
+                    const std::vector<std::size_t>& order) {
   constexpr double kBlock_s = 1;
   RotorLoads loads;
   loads.flight = track.flight;
@@ -34,8 +56,8 @@ RotorLoads loads_of(const Track& track, const stability::Model& model) {
     const bool is_slow = std::abs(now.v_W_m_s.z()) < kMostClimb_m_s &&
                          now.p_W_m.z() - lowest_m > kLeastRise_m && track.cut[i] == residuals::Cut::kNone;
     if (!is_slow || track.restarts[i] != 0) continue;
-    for (int k = 0; k < 4; ++k)
-      sum[k] += model.thrust.force_N(track.duty[i][static_cast<std::size_t>(k)], now.battery_V);
+    const residuals::RotorForces force_N = residuals::rotor_forces_N(model, track, i);
+    for (std::size_t k = 0; k < 4; ++k) sum[static_cast<Eigen::Index>(k)] += force_N[order[k]];
     in_block += 1;
     in_block_s += now.time_s - track.instants[i - 1].time_s;
     ++loads.records;
@@ -53,15 +75,16 @@ RotorLoads loads_of(const Track& track, const stability::Model& model) {
 }  // namespace
 
 std::vector<RotorLoads> rotor_loads(const residuals::Inputs& inputs, const std::string& kind, int jobs) {
-  return residuals::over_tracks<RotorLoads>(
-      inputs, jobs, [&](const Track& track, std::vector<RotorLoads>& all) {
-        if (track.kind != kind || track.thrust_source != logs::ThrustSource::kDuty || !track.has_height)
-          return;
-        const stability::Model model = inputs.model_for(track);
-        if (model.num_rotors() != 4) return;
-        RotorLoads loads = loads_of(track, model);
-        if (loads.records > 0) all.push_back(std::move(loads));
-      });
+  return residuals::over_tracks<RotorLoads>(inputs, jobs,
+                                            [&](const Track& track, std::vector<RotorLoads>& all) {
+                                              if (track.kind != kind || !track.has_height) return;
+                                              const stability::Model model = inputs.model_for(track);
+                                              const std::vector<std::size_t> order = rotors_in_order(model);
+                                              if (order.empty() || !residuals::has_rotor_forces(model, track))
+                                                return;
+                                              RotorLoads loads = loads_of(track, model, order);
+                                              if (loads.records > 0) all.push_back(std::move(loads));
+                                            });
 }
 
 }  // namespace swarmcert::identification

@@ -23,8 +23,8 @@ inline constexpr double kMostClimb_m_s = 0.08, kLeastRise_m = 0.3;
 /// Flights with less slow flight are skipped.
 inline constexpr double kLeastSlowFlight_s = 3;
 
-/// Returns the loads of each flight of vehicles of `kind` whose log has the duty of each motor and the battery voltage.
-/// The result does not depend on `jobs`.
+/// Returns the loads of each flight of vehicles of `kind` whose log has the duty, the command or the speed of each of
+/// four rotors in X. The result does not depend on `jobs`.
 std::vector<RotorLoads> rotor_loads(const residuals::Inputs& inputs, const std::string& kind, int jobs);
 
 }  // namespace swarmcert::identification

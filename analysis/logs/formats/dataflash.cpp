@@ -97,14 +97,14 @@ constexpr std::size_t kFormatMessage_bytes = 89;
 
 class DataflashReader {
  public:
-  DataflashReader(std::string_view bytes, const std::string& path) : bytes_(bytes), path_(path) {
+  DataflashReader(std::string_view bytes, const std::string& path) : bytes_(bytes) {
     log_.path = path;
     log_.format = "ardupilot";
   }
 
   RawLog read() {
     if (!looks_like_dataflash(bytes_)) {
-      refuse_at(path_, 0, "message", "", "is not a format definition, with which these logs start",
+      refuse_at(log_.path, 0, "message", "", "is not a format definition, with which these logs start",
                 "is this an ArduPilot log? Text logs (.log) can be converted to .bin");
     }
     // Definitions, units and multipliers may follow the messages that need them.
@@ -323,7 +323,6 @@ class DataflashReader {
   }
 
   const std::string_view bytes_;
-  const std::string path_;
   RawLog log_;
   std::array<DataflashFormat, 256> formats_;
   /// Letters of the units and multipliers of a format's fields.
@@ -342,8 +341,7 @@ bool looks_like_dataflash(std::string_view head) {
          static_cast<std::uint8_t>(head[2]) == kFormatId;
 }
 
-RawLog read_dataflash(std::istream& in, const std::string& path) {
-  const std::string bytes = read_all(in, path);
+RawLog read_dataflash(std::string& bytes, const std::string& path) {
   return DataflashReader(bytes, path).read();
 }
 

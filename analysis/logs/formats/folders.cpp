@@ -168,7 +168,7 @@ RawLog read_cfclient_folder(const std::string& path) {
   log.format = "csv";
   for (const fs::path& file : csv_files(path)) {
     std::ifstream in = open_log(file.string());
-    RawLog part = read_table(in, file.string(), known_columns());
+    RawLog part = read_table(in, file.string(), {});
     for (RawTopic& topic : part.topics) topic.name = block_of(file.filename().string());
     append(log, std::move(part));
   }

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <iterator>
 
+#include "analysis/logs/formats/bytes.h"
 #include "nn/base/input_error.h"
 
 namespace swarmcert::logs {
@@ -60,6 +61,11 @@ const ForeignFormat* foreign_format_of(std::string_view head) {
   return found == std::end(formats) ? nullptr : found;
 }
 
+bool is_pipe(const std::string& path) {
+  std::error_code ignored;
+  return std::filesystem::is_fifo(path, ignored);
+}
+
 }  // namespace
 
 bool is_foreign_log(std::string_view head) {
@@ -89,9 +95,10 @@ std::string format_head(std::istream& in) {
   return head;
 }
 
-bool is_pipe(const std::string& path) {
-  std::error_code ignored;
-  return std::filesystem::is_fifo(path, ignored);
+std::string head_of_file(const std::string& path) {
+  std::ifstream in;
+  if (!is_pipe(path)) in.open(path, std::ios::binary);
+  return format_head(in);
 }
 
 std::ifstream open_log(const std::string& path) {
@@ -108,17 +115,12 @@ const LogFormat* format_of(std::string_view head) {
   return nullptr;
 }
 
-const LogFormat* format_of_file(const std::string& path) {
-  if (is_pipe(path)) return nullptr;
-  std::ifstream in(path, std::ios::binary);
-  return in ? format_of(format_head(in)) : nullptr;
-}
-
 RawLog parse_raw(std::istream& in, const std::string& path) {
   const std::string head = format_head(in);
   const LogFormat* const format = format_of(head);
   if (format == nullptr) refuse_unknown(head, path);
-  return format->read(in, path);
+  std::string bytes = read_all(in, path);
+  return format->read(bytes, path);
 }
 
 bool is_log_folder(const std::string& path) {

@@ -21,16 +21,17 @@ namespace swarmcert::logs {
 
 #define SWARMCERT_DECLARE(name, stem)            \
   bool looks_like_##stem(std::string_view head); \
-  RawLog read_##stem(std::istream& in, const std::string& path);
+  RawLog read_##stem(std::string& bytes, const std::string& path);
 
 SWARMCERT_LOG_FORMATS(SWARMCERT_DECLARE)
 #undef SWARMCERT_DECLARE
 
-/// How a format is recognised and read. `looks_like` decides by the first kFormatHead_bytes of a file, or fewer.
+/// How a format is recognised and read. `looks_like` decides by the first kFormatHead_bytes of a file, or fewer. `read`
+/// may change the bytes; `path` is for messages and files beside this one.
 struct LogFormat {
   const char* name;  ///< for messages, e.g. "PX4 ULog"
   bool (*looks_like)(std::string_view head);
-  RawLog (*read)(std::istream& in, const std::string& path);
+  RawLog (*read)(std::string& bytes, const std::string& path);
 };
 
 inline constexpr std::size_t kFormatHead_bytes = 4096;
@@ -38,8 +39,9 @@ inline constexpr std::size_t kFormatHead_bytes = 4096;
 /// Returns the first kFormatHead_bytes of a stream and rewinds it.
 std::string format_head(std::istream& in);
 
-/// True for a named pipe, which blocks whoever opens it until somebody writes to it.
-bool is_pipe(const std::string& path);
+/// Returns the first kFormatHead_bytes of a file; nothing if it cannot be read, or is a pipe, which blocks whoever
+/// opens it until somebody writes to it.
+std::string head_of_file(const std::string& path);
 
 /// Opens a log file.
 /// @throws files::InputError if the file cannot be read or is a pipe.
@@ -50,8 +52,6 @@ const std::vector<LogFormat>& log_formats();
 
 /// Returns the format that `head` looks like; nullptr if there is none.
 const LogFormat* format_of(std::string_view head);
-/// Like format_of() for the first bytes of a file; also returns nullptr if the file cannot be read.
-const LogFormat* format_of_file(const std::string& path);
 
 /// Returns true for logs of programs that have to be converted first: ROS 1, MAVLink telemetry, Betaflight.
 bool is_foreign_log(std::string_view head);

@@ -11,6 +11,7 @@
 #include <deque>
 #include <map>
 #include <memory>
+#include <utility>
 
 #include "analysis/logs/formats/bytes.h"
 #include "analysis/logs/formats/decompress.h"
@@ -141,7 +142,7 @@ struct McapChannel {
 };
 class McapReader {
  public:
-  McapReader(std::string_view bytes, const std::string& path) : bytes_(bytes), path_(path) {
+  McapReader(std::string_view bytes, const std::string& path) : bytes_(bytes) {
     log_.path = path;
     log_.format = "mcap";
     decompression_left_ = decompression_limit(bytes.size());
@@ -149,7 +150,7 @@ class McapReader {
 
   RawLog read() {
     if (!looks_like_mcap(bytes_))
-      refuse_at(path_, 0, "magic number", "", "is not that of an MCAP file", "is this a rosbag?");
+      refuse_at(log_.path, 0, "magic number", "", "is not that of an MCAP file", "is this a rosbag?");
     const std::vector<std::size_t> records = find_records();
     // Definitions first: if the chunk that holds them is damaged, the summary at the end of the file repeats them.
     for (const std::size_t at : records) take_definition(*mcap_record_at(bytes_, at));
@@ -246,23 +247,12 @@ class McapReader {
 
   void take_top(std::size_t at) {
     const McapRecord record = *mcap_record_at(bytes_, at);
-    switch (record.code) {
-      case kMessage:
-        take_message(record.content);
-        break;
-      case kChunk:
-        take_chunk(chunk_of(record.content), at);
-        break;
-      case kDataEnd: {
-        // Only the first one is checked: a malicious file could contain many.
-        const std::uint32_t stored = is_past_data_end_ ? 0 : *integer_at<std::uint32_t>(record.content, 0);
-        is_past_data_end_ = true;
-        if (stored != 0 && stored != crc32_of(bytes_.substr(0, at))) log_.health.checksum_failed = true;
-        break;
-      }
-      default:
-        break;
-    }
+    if (record.code == kMessage) take_message(record.content);
+    if (record.code == kChunk) take_chunk(chunk_of(record.content), at);
+    // Only the first end of data is checked: a malicious file could contain many.
+    if (record.code != kDataEnd || std::exchange(is_past_data_end_, true)) return;
+    const std::uint32_t stored = *integer_at<std::uint32_t>(record.content, 0);
+    if (stored != 0 && stored != crc32_of(bytes_.substr(0, at))) log_.health.checksum_failed = true;
   }
 
   void take_chunk(const McapChunk& chunk, std::size_t at) {
@@ -346,7 +336,6 @@ class McapReader {
   }
 
   const std::string_view bytes_;
-  const std::string path_;
   RawLog log_;
   RosBudget budget_;
   bool is_past_data_end_ = false;
@@ -364,9 +353,6 @@ class McapReader {
 
 bool looks_like_mcap(std::string_view head) { return head.substr(0, kMcapMagic.size()) == kMcapMagic; }
 
-RawLog read_mcap(std::istream& in, const std::string& path) {
-  const std::string bytes = read_all(in, path);
-  return McapReader(bytes, path).read();
-}
+RawLog read_mcap(std::string& bytes, const std::string& path) { return McapReader(bytes, path).read(); }
 
 }  // namespace swarmcert::logs

@@ -176,7 +176,7 @@ class RosbagReader {
  public:
   /// @param bytes must outlive this object
   RosbagReader(std::string& bytes, const std::string& path)
-      : is_cut_(cut_to_whole_pages(bytes)), database_(bytes, path), path_(path) {
+      : is_cut_(cut_to_whole_pages(bytes)), database_(bytes, path) {
     log_.path = path;
     log_.format = "rosbag2 sqlite";
     log_.health.truncated = is_cut_;
@@ -211,7 +211,7 @@ class RosbagReader {
   }
 
   [[noreturn]] void refuse_table(const std::string& name, const std::string& what) const {
-    throw files::InputError({path_, "", "table", files::in_quotes(name), what,
+    throw files::InputError({log_.path, "", "table", files::in_quotes(name), what,
                              "this SQLite database is not a rosbag2 log, or it is damaged"});
   }
   void demand_table(const std::string& name) {
@@ -302,7 +302,6 @@ class RosbagReader {
 
   const bool is_cut_;
   Database database_;
-  const std::string path_;
   RawLog log_;
   RosBudget budget_;
   std::size_t bytes_left_ = 0, decompression_left_ = 0, without_topic_ = 0;
@@ -316,8 +315,7 @@ bool looks_like_rosbag_sqlite(std::string_view head) {
   return head.substr(0, kSqliteMagic.size()) == kSqliteMagic;
 }
 
-RawLog read_rosbag_sqlite(std::istream& in, const std::string& path) {
-  std::string bytes = read_all(in, path);
+RawLog read_rosbag_sqlite(std::string& bytes, const std::string& path) {
   if (!looks_like_rosbag_sqlite(bytes))
     refuse_at(path, 0, "magic number", "", "is not that of an SQLite database", "is this a rosbag?");
   const std::string journal_path = path + "-wal";

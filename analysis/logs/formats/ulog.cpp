@@ -71,34 +71,21 @@ bool has_form(const UlogMessage& message) {
   const auto has_key = [&](std::size_t at) {
     return body.size() > at + 1 && is_identifier(body.substr(at + 1, 1)) && keyed_value(body.substr(at));
   };
-  switch (message.type) {
-    case 'B':
-      return body.size() >= 40;
-    case 'F':
-      return is_identifier(body.substr(0, 1)) &&
-             body.substr(0, kLongestName).find(':') != std::string_view::npos;
-    case 'I':
-      return has_key(0);
-    case 'P':
-      return has_key(0) && body.size() == 1 + kParameter_bytes + static_cast<unsigned char>(body[0]);
-    case 'M':
-      return !body.empty() && (body[0] == 0 || body[0] == 1) && has_key(1);
-    case 'Q':
-      return has_key(1) && body.size() == 2 + kParameter_bytes + static_cast<unsigned char>(body[1]);
-    case 'A':
-      return body.size() >= 4 && is_identifier(body.substr(3), kLongestName);
-    case 'R':
-    case 'O':
-      return body.size() == 2;
-    case 'L':
-      return body.size() >= 9;
-    case 'C':
-      return body.size() >= 11;
-    case 'S':
-      return body == kSyncMagic;
-    default:
-      return false;
-  }
+  const char type = message.type;
+  if (type == 'F')
+    return is_identifier(body.substr(0, 1)) &&
+           body.substr(0, kLongestName).find(':') != std::string_view::npos;
+  if (type == 'P')
+    return has_key(0) && body.size() == 1 + kParameter_bytes + static_cast<unsigned char>(body[0]);
+  if (type == 'Q')
+    return has_key(1) && body.size() == 2 + kParameter_bytes + static_cast<unsigned char>(body[1]);
+  if (type == 'M') return !body.empty() && (body[0] == 0 || body[0] == 1) && has_key(1);
+  if (type == 'A') return body.size() >= 4 && is_identifier(body.substr(3), kLongestName);
+  if (type == 'I') return has_key(0);
+  if (type == 'R' || type == 'O') return body.size() == 2;
+  if (type == 'S') return body == kSyncMagic;
+  const std::size_t least = type == 'B' ? 40 : type == 'L' ? 9 : type == 'C' ? 11 : SIZE_MAX;
+  return body.size() >= least;
 }
 
 constexpr std::string_view kUlogMagic = "ULog\x01\x12\x35";
@@ -109,7 +96,7 @@ constexpr std::size_t kMostLooks = 64;
 
 class UlogReader {
  public:
-  UlogReader(std::string_view bytes, const std::string& path) : bytes_(bytes), path_(path) {
+  UlogReader(std::string_view bytes, const std::string& path) : bytes_(bytes) {
     log_.path = path;
     log_.format = "ulog";
   }
@@ -141,12 +128,12 @@ class UlogReader {
 
   void read_file_head() {
     if (!looks_like_ulog(bytes_))
-      refuse_at(path_, 0, "magic number", "", "is not that of a ULog file", "is this a PX4 log?");
+      refuse_at(log_.path, 0, "magic number", "", "is not that of a ULog file", "is this a PX4 log?");
     if (bytes_.size() < kFileHead_bytes)
-      refuse_at(path_, bytes_.size(), "file head", "", "the file ends inside it", files::kCopyAgain);
+      refuse_at(log_.path, bytes_.size(), "file head", "", "the file ends inside it", files::kCopyAgain);
     const int version = static_cast<unsigned char>(bytes_[7]);
     if (version > 1)
-      refuse_at(path_, 7, "version", std::to_string(version), "is not known", "supported are 0 and 1");
+      refuse_at(log_.path, 7, "version", std::to_string(version), "is not known", "supported are 0 and 1");
   }
 
   /// Returns the offsets of appended sections in ascending order.
@@ -158,7 +145,7 @@ class UlogReader {
     for (std::size_t i = 0; i < 8; ++i) {
       const int unknown = static_cast<unsigned char>(flags->body[8 + i]) & (i == 0 ? 0xFE : 0xFF);
       if (unknown != 0) {
-        refuse_at(path_, kFileHead_bytes + kMessageHead_bytes + 8 + i, "incompatible flags",
+        refuse_at(log_.path, kFileHead_bytes + kMessageHead_bytes + 8 + i, "incompatible flags",
                   fmt::format("{:#04x}", unknown), "announce a feature that this reader does not know",
                   "convert the log with the tools of the firmware that wrote it");
       }
@@ -292,28 +279,13 @@ class UlogReader {
 
   void take(const UlogMessage& message) {
     const std::string_view body = message.body;
-    switch (message.type) {
-      case 'F':
-        if (!formats_.add(body)) ++log_.health.damaged_blocks;
-        break;
-      case 'P':
-        take_parameter(body);
-        break;
-      case 'A':
-        subscribe(body);
-        break;
-      case 'R':
-        subscriptions_.erase(*integer_at<std::uint16_t>(body, 0));
-        break;
-      case 'D':
-        take_record(body);
-        break;
-      case 'O':
-        log_.health.dropouts_s += *integer_at<std::uint16_t>(body, 0) / 1e3;
-        break;
-      default:  // flags, information, texts, defaults and synchronisation
-        break;
-    }
+    if (message.type == 'F' && !formats_.add(body)) ++log_.health.damaged_blocks;
+    if (message.type == 'P') take_parameter(body);
+    if (message.type == 'A') subscribe(body);
+    if (message.type == 'R') subscriptions_.erase(*integer_at<std::uint16_t>(body, 0));
+    if (message.type == 'D') take_record(body);
+    if (message.type == 'O') log_.health.dropouts_s += *integer_at<std::uint16_t>(body, 0) / 1e3;
+    // Flags, information, texts, defaults and synchronisation hold no signals.
   }
 
   void take_parameter(std::string_view body) {
@@ -376,7 +348,6 @@ class UlogReader {
   }
 
   const std::string_view bytes_;
-  const std::string path_;
   RawLog log_;
   UlogFormats formats_;
   std::map<std::uint16_t, Subscription> subscriptions_;
@@ -390,9 +361,6 @@ class UlogReader {
 
 bool looks_like_ulog(std::string_view head) { return head.substr(0, kUlogMagic.size()) == kUlogMagic; }
 
-RawLog read_ulog(std::istream& in, const std::string& path) {
-  const std::string bytes = read_all(in, path);
-  return UlogReader(bytes, path).read();
-}
+RawLog read_ulog(std::string& bytes, const std::string& path) { return UlogReader(bytes, path).read(); }
 
 }  // namespace swarmcert::logs

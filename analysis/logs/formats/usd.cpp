@@ -141,18 +141,18 @@ RawLog read_blocks(const std::string& bytes, const std::string& path) {
 
 class EventReader {
  public:
-  EventReader(const std::string& bytes, const std::string& path) : bytes_(bytes), path_(path) {}
+  EventReader(const std::string& bytes, const std::string& path) : bytes_(bytes) { log_.path = path; }
 
   RawLog read() {
     const int version = number<std::uint16_t>(1, "header");
     if (version != 1 && version != 2)
-      refuse_at(path_, 1, "version", std::to_string(version), "is not known", "supported are 1 and 2");
+      refuse_at(log_.path, 1, "version", std::to_string(version), "is not known", "supported are 1 and 2");
     is_in_ms_ = version == 1;
     log_.format = fmt::format("usd version {}", version);
     const std::size_t num_events = number<std::uint16_t>(3, "header");
     std::size_t at = 5;
     for (std::size_t i = 0; i < num_events; ++i) read_event(at);
-    if (events_.empty()) refuse_at(path_, 3, "number of events", "0", "nothing was logged", "");
+    if (events_.empty()) refuse_at(log_.path, 3, "number of events", "0", "nothing was logged", "");
     read_records(at);
     return std::move(log_);
   }
@@ -161,13 +161,13 @@ class EventReader {
   template <typename Integer>
   Integer number(std::size_t at, const char* field) const {
     const std::optional<Integer> value = integer_at<Integer>(bytes_, at);
-    if (!value) refuse_at(path_, at, field, "", "the file ends inside the header", "");
+    if (!value) refuse_at(log_.path, at, field, "", "the file ends inside the header", "");
     return *value;
   }
 
   void demand_short_header(std::size_t at, std::size_t now) const {
     if (now > kLargestHeader_bytes)
-      refuse_at(path_, at, "header", "", "is longer than the firmware allows", "");
+      refuse_at(log_.path, at, "header", "", "is longer than the firmware allows", "");
   }
 
   void read_event(std::size_t& at) {
@@ -175,7 +175,8 @@ class EventReader {
     const auto id = number<std::uint16_t>(at, "event");
     at += 2;
     const std::size_t size = std::string_view(bytes_).substr(at, kLongestName_bytes).find('\0');
-    if (size == std::string_view::npos) refuse_at(path_, at, "event", "", "its name is not terminated", "");
+    if (size == std::string_view::npos)
+      refuse_at(log_.path, at, "event", "", "its name is not terminated", "");
     const std::string name = bytes_.substr(at, size);
     at += size + 1;
     const std::size_t num_variables = number<std::uint16_t>(at, "event");
@@ -183,11 +184,11 @@ class EventReader {
     UsdVariables variables;
     for (std::size_t i = 0; i < num_variables; ++i) {
       const std::size_t before = at;
-      variables.read(bytes_, path_, '\0', at);
+      variables.read(bytes_, log_.path, '\0', at);
       demand_short_header(before, at);
     }
     if (event_of(id) < events_.size())
-      refuse_at(path_, at, "event", std::to_string(id), "is declared twice", "");
+      refuse_at(log_.path, at, "event", std::to_string(id), "is declared twice", "");
     log_.topics.push_back(variables.topic(name));
     events_.emplace_back(id, std::move(variables));
   }
@@ -254,7 +255,6 @@ class EventReader {
   }
 
   const std::string& bytes_;
-  const std::string path_;
   RawLog log_;
   bool is_in_ms_ = false;
   std::vector<std::pair<std::size_t, UsdVariables>> events_;
@@ -277,8 +277,7 @@ bool looks_like_usd(std::string_view head) {
           kUsdTypes.find(head[bracket + 1]) != std::string_view::npos && head[bracket - 1] != ' ');
 }
 
-RawLog read_usd(std::istream& in, const std::string& path) {
-  const std::string bytes = read_all(in, path);
+RawLog read_usd(std::string& bytes, const std::string& path) {
   RawLog log = has_events(bytes) ? EventReader(bytes, path).read() : read_blocks(bytes, path);
   log.path = path;
   return log;

@@ -77,9 +77,8 @@ HeldAnswer AxisInSlices::held(Interval d, Interval w, Interval velocity, Interva
     slice.per_N = slice.per_rising_N = (direct + rest.integral[0]).upper;
   }
   slice.acceleration_before_m_s2 = slice.acceleration_m_s2;
-  for (std::size_t k = n - std::min(back, n); k < n; ++k) {
+  for (std::size_t k = n - std::min(back, n); k < n; ++k)
     slice.acceleration_before_m_s2 = hull(slice.acceleration_before_m_s2, acceleration[k]);
-  }
   for (const Interval& a : acceleration)
     slice.largest_acceleration_m_s2 = std::max(slice.largest_acceleration_m_s2, a.mag());
   return hold_error(*loop, slice);

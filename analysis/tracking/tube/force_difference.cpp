@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+
+#include "nn/base/doubles.h"
 
 namespace swarmcert::analysis {
 
@@ -12,7 +13,6 @@ using Eigen::Index;
 using Eigen::VectorXd;
 using lipschitz::Box;
 
-constexpr double kUnbounded = std::numeric_limits<double>::infinity();
 /// Relative allowance for round-off, far above the error of a few hundred operations on terms of equal magnitude.
 constexpr double kRounding = 1e-12;
 
@@ -45,7 +45,7 @@ struct ForceDifference::Form {
       size += std::max(std::abs(a), std::abs(b));
     }
     const double result = value + kRounding * size;
-    return std::isnan(result) ? kUnbounded : result;
+    return std::isnan(result) ? kInfinity : result;
   }
 };
 
@@ -197,8 +197,8 @@ void ForceDifference::refine(int boxes, double tolerance_N, const std::atomic<bo
 
 Interval ForceDifference::over(const Deviations& deviations) const {
   const Box all = box_of(scene_->seen_states(*stretch_, deviations));
-  double above = -kUnbounded;
-  double below = -kUnbounded;
+  double above = -kInfinity;
+  double below = -kInfinity;
   for (const auto& part : parts_) {
     Box box = all;
     bool is_empty = false;

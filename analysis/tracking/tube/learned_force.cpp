@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
+#include "nn/base/doubles.h"
 #include "nn/base/input_error.h"
 #include "nn/weights/compositions.h"
 #include "nn/weights/functions.h"
@@ -17,8 +17,6 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using lipschitz::ReachLayer;
 using lipschitz::ReachNetwork;
-
-constexpr double kOpenEnd = std::numeric_limits<double>::infinity();
 
 /// Appends identity layers, which pass on what a ReLU has already let through: relu(I h) = h.
 void deepen(ReachNetwork& network, std::size_t depth, const std::string& path) {
@@ -58,10 +56,9 @@ ReachNetwork side_by_side(const std::vector<ReachNetwork>& parts) {
 /// Replaces the outputs of `parts` networks, `hidden` outputs each, by their sum.
 void add_up(ReachLayer& last, Index hidden) {
   const Index parts = last.bias.size() / hidden;
-  MatrixXd weights(hidden, last.weights.cols());
+  MatrixXd weights = MatrixXd::Zero(hidden, last.weights.cols());
   VectorXd bias = VectorXd::Zero(hidden);
   VectorXd size = VectorXd::Zero(hidden);
-  weights.setZero();
   for (Index p = 0; p < parts; ++p) {
     weights += last.weights.middleRows(p * hidden, hidden);  // exact: nonzero entries do not overlap
     bias += last.bias.segment(p * hidden, hidden);
@@ -127,7 +124,7 @@ LearnedForce::LearnedForce(const files::Network& network, const std::string& kin
   }
 
   const auto size = static_cast<std::size_t>(state_size(neighbours));
-  clamp_ = {std::vector<double>(size, -kOpenEnd), std::vector<double>(size, kOpenEnd)};
+  clamp_ = {std::vector<double>(size, -kInfinity), std::vector<double>(size, kInfinity)};
   if (!network.clamp) return;
   for (int j = 0; j < neighbours; ++j) {
     for (int i = 0; i < inputs; ++i) {
@@ -176,9 +173,9 @@ LearnedForce::Forms LearnedForce::over(const lipschitz::Box& box, const Forms* a
   forms.upper = newton_per_unit_ * (constants(0) + 1e-15 * size(0));
   forms.lower = newton_per_unit_ * (constants(1) + 1e-15 * size(1));
   if (std::isnan(forms.upper) || !forms.upper_row.allFinite())
-    forms.upper = kOpenEnd, forms.upper_row.setZero();
+    forms.upper = kInfinity, forms.upper_row.setZero();
   if (std::isnan(forms.lower) || !forms.lower_row.allFinite())
-    forms.lower = kOpenEnd, forms.lower_row.setZero();
+    forms.lower = kInfinity, forms.lower_row.setZero();
   return forms;
 }
 

@@ -58,17 +58,17 @@ LocalTube local_tube(const stability::FlownLoop& stated, const stability::Model&
   stability::FlownLoop tracking = stated;
   const double truth_lag_s = TruthForce(truth, tracking.plant.largest_thrust_N).motor_lag_s();
   if (truth_lag_s > 0) tracking.gains.motor_lag_s = truth_lag_s;
-  if (tracking.gains.rate_hz > 0) {
-    LocalTube sampled = tube_of_loop(tracking, truth, network, task, vehicles, options, true);
-    if (sampled.proved || sampled.cancelled) return sampled;
-    LocalTube continuous = tube_of_loop(tracking, truth, network, task, vehicles, options, false);
-    for (stability::Assumption& a : continuous.assumptions) {
-      if (a.name.rfind("continuous position loop", 0) == 0)
-        a.note = "no tube was proved for the sampled loop (" + sampled.why + "); " + a.note;
-    }
-    return continuous;
-  }
-  return tube_of_loop(tracking, truth, network, task, vehicles, options, false);
+  const auto tube = [&](bool is_sampled) {
+    return tube_of_loop(tracking, truth, network, task, vehicles, options, is_sampled);
+  };
+  if (!(tracking.gains.rate_hz > 0)) return tube(false);
+  LocalTube sampled = tube(true);
+  if (sampled.proved || sampled.cancelled) return sampled;
+  LocalTube continuous = tube(false);
+  for (stability::Assumption& a : continuous.assumptions)
+    if (a.name.rfind("continuous position loop", 0) == 0)
+      a.note = "no tube was proved for the sampled loop (" + sampled.why + "); " + a.note;
+  return continuous;
 }
 
 }  // namespace swarmcert::analysis

@@ -35,19 +35,6 @@ Deviations each(const Deviations& a, const Deviations& b, const Change& change) 
   return result;
 }
 
-bool every_inside(const Deviations& inner, const Deviations& outer) {
-  bool result = true;
-  each(inner, outer, [&result](Interval a, Interval b) {
-    result = result && inside(a, b);
-    return a;
-  });
-  return result;
-}
-
-Deviations hull_of(const Deviations& a, const Deviations& b) {
-  return each(a, b, [](Interval x, Interval y) { return hull(x, y); });
-}
-
 /// Deviations by the part of the lag interval in which the vehicle's own lag lies.
 using ByPart = std::vector<Deviations>;
 
@@ -58,13 +45,19 @@ ByPart each(const ByPart& a, const ByPart& b, const Change& change) {
   return result;
 }
 
-bool every_inside(const ByPart& inner, const ByPart& outer) {
+/// Of deviations, or of all parts.
+template <class Any>
+bool every_inside(const Any& inner, const Any& outer) {
   bool result = true;
-  for (std::size_t p = 0; p < inner.size(); ++p) result = result && every_inside(inner[p], outer[p]);
+  each(inner, outer, [&result](Interval a, Interval b) {
+    result = result && inside(a, b);
+    return a;
+  });
   return result;
 }
 
-ByPart hull_of(const ByPart& a, const ByPart& b) {
+template <class Any>
+Any hull_of(const Any& a, const Any& b) {
   return each(a, b, [](Interval x, Interval y) { return hull(x, y); });
 }
 

@@ -31,16 +31,6 @@ Interval power(Interval x, double p) {
           pow(Interval(std::max(x.upper, kTiny)), p).upper};
 }
 
-double value_of(const stability::EffectSpec& spec, const char* name) {
-  const stability::EffectInfo& info = stability::effect_info(spec.name);
-  const stability::EffectValues values = effect_values(info, spec);
-  for (std::size_t i = 0; i < info.linear.size(); ++i)
-    if (info.linear[i].name == name) return values.linear[i];
-  for (std::size_t i = 0; i < info.shape.size(); ++i)
-    if (info.shape[i].name == name) return values.shape[i];
-  throw std::logic_error(std::string("no parameter ") + name);
-}
-
 /// Enclosure of a field and its gradient on a set.
 struct Strength {
   Interval g;
@@ -79,6 +69,14 @@ Strength below_a_vehicle(const Offset& dp, double decay, double spread_m, double
   return result;
 }
 
+/// Cutting off a wake changes the sum by at most its own strength there.
+void add_cut_off(double amplitude_N, double decay, TruthForce::Wake& sum) {
+  const Interval nearest = Interval(stability::kWakeReference_m) / Interval(stability::kWakeNearest_m);
+  const double cut_off_N = up(amplitude_N * kCutOff * pow(nearest, decay).upper * 1.001);
+  sum.cut_off_N = up(sum.cut_off_N + cut_off_N);
+  sum.value_N += Interval(-cut_off_N, cut_off_N);
+}
+
 }  // namespace
 
 TruthForce::TruthForce(const stability::Model& truth, double largest_thrust_N)
@@ -89,20 +87,20 @@ TruthForce::TruthForce(const stability::Model& truth, double largest_thrust_N)
     };
     const bool for_some_only = !effect.vehicle.empty();
     if (!effect.is_expression() && effect.name == "downwash") {
-      if (value_of(effect, "tail") != 0 || value_of(effect, "convection_s_m") != 0) {
+      if (effect_value(effect, "tail") != 0 || effect_value(effect, "convection_s_m") != 0) {
         refuse("has a tail or is carried along by the air, for which there is no enclosure over a tube");
       }
-      downwash_.push_back({value_of(effect, "amplitude_N"), value_of(effect, "decay_exponent"),
-                           value_of(effect, "spread_m"), value_of(effect, "spread_slope"),
-                           value_of(effect, "norm_exponent"),
+      downwash_.push_back({effect_value(effect, "amplitude_N"), effect_value(effect, "decay_exponent"),
+                           effect_value(effect, "spread_m"), effect_value(effect, "spread_slope"),
+                           effect_value(effect, "norm_exponent"),
                            pow(Interval(truth.mass_kg) / Interval(stability::kWakeReferenceMass_kg),
-                               value_of(effect, "mass_exponent")),
+                               effect_value(effect, "mass_exponent")),
                            for_some_only});
     } else if (!effect.is_expression() && effect.name == "upper_lift") {
-      lift_.push_back({value_of(effect, "amplitude_N"), value_of(effect, "decay_exponent"),
-                       value_of(effect, "spread_m"), for_some_only});
+      lift_.push_back({effect_value(effect, "amplitude_N"), effect_value(effect, "decay_exponent"),
+                       effect_value(effect, "spread_m"), for_some_only});
     } else if (effect.name == "motor_lag") {
-      motor_lag_s_ = value_of(effect, "tau_s");
+      motor_lag_s_ = effect_value(effect, "tau_s");
     } else if (effect.name == "thrust_ratio" || effect.name == "delay") {
       refuse("acts through the loop, which a tube does not model");
     } else {
@@ -142,13 +140,8 @@ void TruthForce::add(const Downwash& field, const std::vector<Offset>& neighbour
   Interval force = -(A * total);
   if (field.for_some_only) force = hull(force, Interval(0));
   sum.value_N += force;
-  // Cutting off a wake changes the sum by at most its own strength there.
-  const double cut_off =
-      up(field.amplitude_N * field.mass_factor.upper * kCutOff *
-         pow(Interval(stability::kWakeReference_m) / Interval(stability::kWakeNearest_m), field.decay).upper *
-         static_cast<double>(neighbours.size()) * 1.001);
-  sum.cut_off_N = up(sum.cut_off_N + cut_off);
-  sum.value_N += Interval(-cut_off, cut_off);
+  const auto wakes = static_cast<double>(neighbours.size());
+  add_cut_off(field.amplitude_N * field.mass_factor.upper * wakes, field.decay, sum);
   for (std::size_t j = 0; j < each.size(); ++j) {
     if (each[j].g.upper <= 0) continue;
     // d total / d g_j = (g_j / total)^(p - 1), which lies between 0 and 1.
@@ -182,12 +175,7 @@ void TruthForce::add(const Lift& field, const std::vector<Offset>& neighbours, W
     if (may_vanish) force = hull(force, Interval(0));
     if (z.lower <= stability::kWakeTouching_m && field.amplitude_N > 0) sum.has_gradient = false;
     sum.value_N += force;
-    const double cut_off = up(
-        field.amplitude_N * kCutOff *
-        pow(Interval(stability::kWakeReference_m) / Interval(stability::kWakeNearest_m), field.decay).upper *
-        1.001);
-    sum.cut_off_N = up(sum.cut_off_N + cut_off);
-    sum.value_N += Interval(-cut_off, cut_off);
+    add_cut_off(field.amplitude_N, field.decay, sum);
     Offset& gradient = sum.gradient_N_m[j];
     for (std::size_t k = 0; k < 2; ++k) gradient[k] += -(force * neighbours[j][k] / ss);
     // h equals z beyond 0.12 m, and z = -dp_z: the force increases with dp_z.
@@ -217,11 +205,11 @@ std::array<Interval, 3> TruthForce::rest_N(Interval height_m,
   for (const stability::EffectSpec& effect : others_) {
     if (effect.name == "constant_force" && effect.vehicle.empty()) {
       const char* const names[] = {"force_x_N", "force_y_N", "force_z_N"};
-      for (std::size_t k = 0; k < 3; ++k) force_N[k] += Interval(value_of(effect, names[k]));
+      for (std::size_t k = 0; k < 3; ++k) force_N[k] += Interval(effect_value(effect, names[k]));
       continue;
     }
     if (effect.name == "drag_linear" && effect.vehicle.empty()) {
-      const Interval drag(value_of(effect, "drag_N_s_m"));
+      const Interval drag(effect_value(effect, "drag_N_s_m"));
       for (std::size_t k = 0; k < 3; ++k) force_N[k] += -(drag * velocity_m_s[k]);
       continue;
     }

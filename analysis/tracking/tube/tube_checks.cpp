@@ -4,13 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+
+#include "nn/base/doubles.h"
+#include "stability/bounds/enclosures/interval_functions.h"
 
 namespace swarmcert::analysis {
 
 namespace {
 
-constexpr double kNotKnown = std::numeric_limits<double>::infinity();
 constexpr double kGravity_m_s2 = stability::kGravity_m_s2;
 /// Distance from which neighbours are faded out in flight (controller::CutOffs): 1 m less 0.1 m.
 constexpr double kFade_m = 0.9;
@@ -18,7 +19,7 @@ constexpr double kFade_m = 0.9;
 double largest(const std::vector<double>& values) { return *std::max_element(values.begin(), values.end()); }
 
 double length(Interval x, Interval y, Interval z) {
-  const auto square = [](Interval a) { return abs(a) * abs(a); };
+  using stability::square;
   return sqrt(square(x) + square(y) + square(z)).upper;
 }
 
@@ -81,7 +82,7 @@ double lag_error_N(const ErrorLoop& loop, const AxisLoads& acting, double mass_k
   if (!loop.has_lag) return 0;
   const bool starts_at_rest = acting.planned_m_s2.front() < 1e-6;
   const double by_jerk =
-      starts_at_rest ? up(up(loop.lags_s.upper * largest(acting.jerk_m_s3)) + 1e-6) : kNotKnown;
+      starts_at_rest ? up(up(loop.lags_s.upper * largest(acting.jerk_m_s3)) + 1e-6) : kInfinity;
   return up(2 * largest(acting.truth_N) + up(mass_kg * std::min(2 * largest(acting.planned_m_s2), by_jerk)));
 }
 

@@ -14,32 +14,16 @@ using Eigen::MatrixXd;
 /// times. The truncation error is below 0.25^18/18! (1 + 1/64) < 3e-27 in the row-sum norm, and hence in every entry.
 IntervalMatrix exponential(const IntervalMatrix& generator, Interval t) {
   const std::size_t n = generator.size();
-  IntervalMatrix scaled(n);
+  IntervalMatrix scaled = generator * t;
   double largest = 0;
   for (std::size_t i = 0; i < n; ++i) {
     double row = 0;
-    for (std::size_t j = 0; j < n; ++j) {
-      scaled(i, j) = generator(i, j) * t;
-      row = up(row + scaled(i, j).mag());
-    }
+    for (std::size_t j = 0; j < n; ++j) row = up(row + scaled(i, j).mag());
     largest = std::max(largest, row);
   }
   int halvings = 0;
   while (std::ldexp(largest, -halvings) > 0.25) ++halvings;
-  for (std::size_t i = 0; i < n; ++i) {
-    for (std::size_t j = 0; j < n; ++j) scaled(i, j) = scaled(i, j) * Interval(std::ldexp(1.0, -halvings));
-  }
-  IntervalMatrix term(MatrixXd::Identity(static_cast<Index>(n), static_cast<Index>(n)));
-  IntervalMatrix total = term;
-  for (int k = 1; k < 18; ++k) {
-    term = term * scaled;
-    for (std::size_t i = 0; i < n; ++i) {
-      for (std::size_t j = 0; j < n; ++j) {
-        term(i, j) = term(i, j) / Interval(k);
-        total(i, j) += term(i, j);
-      }
-    }
-  }
+  IntervalMatrix total = exponential_sum(scaled * Interval(std::ldexp(1.0, -halvings)));
   for (std::size_t i = 0; i < n; ++i) {
     for (std::size_t j = 0; j < n; ++j) total(i, j) += Interval(-3e-27, 3e-27);
   }
@@ -47,11 +31,11 @@ IntervalMatrix exponential(const IntervalMatrix& generator, Interval t) {
   return total;
 }
 
-MatrixXd middle(const IntervalMatrix& m) {
+MatrixXd centre_of(const IntervalMatrix& m) {
   MatrixXd result(static_cast<Index>(m.size()), static_cast<Index>(m.columns()));
   for (std::size_t i = 0; i < m.size(); ++i) {
     for (std::size_t j = 0; j < m.columns(); ++j) {
-      result(static_cast<Index>(i), static_cast<Index>(j)) = (m(i, j).lower + m(i, j).upper) / 2;
+      result(static_cast<Index>(i), static_cast<Index>(j)) = middle(m(i, j));
     }
   }
   return result;
@@ -135,7 +119,7 @@ IntervalVector IntervalSampledModel::error_at(double phase_s) const {
 
 std::optional<ContractingSampledSystem> contracting(const IntervalSampledModel& model) {
   const IntervalMatrix map = model.hold() * model.control();
-  const MatrixXd approximate = middle(map);
+  const MatrixXd approximate = centre_of(map);
   const Index n = approximate.rows();
   const double radius = Eigen::EigenSolver<MatrixXd>(approximate, false).eigenvalues().cwiseAbs().maxCoeff();
   if (!(radius < 1)) return std::nullopt;

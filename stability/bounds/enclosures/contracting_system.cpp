@@ -69,7 +69,7 @@ struct Companion {
     }
     for (std::size_t k = 0; k < n; ++k) {
       matrix(n - 1, k) = -a[k];
-      approximate(size - 1, static_cast<Index>(k)) = -(a[k].lower + a[k].upper) / 2;
+      approximate(size - 1, static_cast<Index>(k)) = -middle(a[k]);
     }
   }
 
@@ -109,28 +109,20 @@ void scale_time(double scale, ContractingSystem& system) {
   for (std::size_t r = 0; r < 4; ++r) {
     for (Interval& x : system.rows[r]) x = x * Interval(factors[r]);
   }
-  const std::size_t n = system.b.size();
-  for (std::size_t i = 0; i < n; ++i) {
-    for (std::size_t j = 0; j < n; ++j) system.A(i, j) = system.A(i, j) * Interval(scale);
-  }
+  system.A = system.A * Interval(scale);
   system.alpha *= scale;
 }
 
 }  // namespace
-
-std::optional<ContractingSystem> contracting(const TransferFunction& h) {
-  return contracting(IntervalVector(h.numerator.begin(), h.numerator.end()),
-                     IntervalVector(h.denominator.begin(), h.denominator.end()));
-}
 
 std::optional<ContractingSystem> contracting(const IntervalVector& numerator,
                                              const IntervalVector& denominator) {
   const std::size_t n = denominator.size() - 1;
   double slowest = 1e300;
   double fastest = 0;
-  Polynomial middle;
-  for (const Interval& x : denominator) middle.push_back(x.lower + (x.upper - x.lower) / 2);
-  for (const std::complex<double>& pole : poles(middle)) {
+  Polynomial centre;
+  for (const Interval& x : denominator) centre.push_back(middle(x));
+  for (const std::complex<double>& pole : poles(centre)) {
     slowest = std::min(slowest, -pole.real());
     fastest = std::max(fastest, std::abs(pole));
   }

@@ -26,7 +26,5 @@ struct ContractingSystem {
 /// @param denominator in ascending powers; the leading coefficient does not contain zero.
 std::optional<ContractingSystem> contracting(const IntervalVector& numerator,
                                              const IntervalVector& denominator);
-/// The same for a transfer function without a delay.
-std::optional<ContractingSystem> contracting(const TransferFunction& h);
 
 }  // namespace swarmcert::stability

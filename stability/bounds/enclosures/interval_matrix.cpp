@@ -18,6 +18,18 @@ IntervalMatrix operator*(const IntervalMatrix& a, const IntervalMatrix& b) {
   return result;
 }
 
+IntervalMatrix operator*(IntervalMatrix m, Interval factor) {
+  for (std::size_t i = 0; i < m.size(); ++i)
+    for (std::size_t j = 0; j < m.columns(); ++j) m(i, j) = m(i, j) * factor;
+  return m;
+}
+
+IntervalMatrix& operator+=(IntervalMatrix& a, const IntervalMatrix& b) {
+  for (std::size_t i = 0; i < a.size(); ++i)
+    for (std::size_t j = 0; j < a.columns(); ++j) a(i, j) += b(i, j);
+  return a;
+}
+
 IntervalVector operator*(const IntervalVector& row, const IntervalMatrix& m) {
   IntervalVector result(m.columns());
   for (std::size_t j = 0; j < m.columns(); ++j) {
@@ -36,6 +48,24 @@ double norm_above(const IntervalVector& v) {
   Interval total;
   for (const Interval& x : v) total += Interval(x.mag()) * x.mag();
   return sqrt(total).upper;
+}
+
+double norm_above(const IntervalMatrix& m) {
+  Interval squares;
+  for (std::size_t i = 0; i < m.size(); ++i)
+    for (std::size_t j = 0; j < m.columns(); ++j) squares += Interval(m(i, j).mag()) * m(i, j).mag();
+  return sqrt(squares).upper;
+}
+
+IntervalMatrix exponential_sum(const IntervalMatrix& m) {
+  const auto n = static_cast<Eigen::Index>(m.size());
+  IntervalMatrix term(MatrixXd::Identity(n, n));
+  IntervalMatrix total = term;
+  for (int k = 1; k < kExponentialTerms; ++k) {
+    term = term * m * (Interval(1) / Interval(k));
+    total += term;
+  }
+  return total;
 }
 
 std::optional<IntervalMatrix> inverse(const MatrixXd& m) {

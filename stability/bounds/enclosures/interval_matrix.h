@@ -11,6 +11,10 @@ namespace swarmcert::stability {
 
 using IntervalVector = std::vector<Interval>;
 
+inline double middle(Interval x) { return x.lower + (x.upper - x.lower) / 2; }
+/// Returns the distance from `centre` to the farthest point of x, rounded up.
+inline double farthest(Interval x, double centre) { return up(std::max(x.upper - centre, centre - x.lower)); }
+
 class IntervalMatrix {
  public:
   explicit IntervalMatrix(std::size_t n) : IntervalMatrix(n, n) {}
@@ -34,11 +38,19 @@ class IntervalMatrix {
 };
 
 IntervalMatrix operator*(const IntervalMatrix& a, const IntervalMatrix& b);
+IntervalMatrix operator*(IntervalMatrix m, Interval factor);
+IntervalMatrix& operator+=(IntervalMatrix& a, const IntervalMatrix& b);
 IntervalVector operator*(const IntervalVector& row, const IntervalMatrix& m);
 Interval dot(const IntervalVector& a, const std::vector<double>& b);
 
 /// Returns an upper bound on the Euclidean norm.
 double norm_above(const IntervalVector& v);
+/// Returns an upper bound on the Frobenius norm.
+double norm_above(const IntervalMatrix& m);
+
+inline constexpr int kExponentialTerms = 18;
+/// Returns the sum of the first kExponentialTerms terms m^k/k! of exp(m).
+IntervalMatrix exponential_sum(const IntervalMatrix& m);
 
 /// Encloses the inverse of a matrix by interval Gauss-Jordan elimination of (approximate inverse times m), which is
 /// nearly the identity. Returns nothing if a pivot may vanish.

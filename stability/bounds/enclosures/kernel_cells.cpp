@@ -5,91 +5,12 @@
 #include <stdexcept>
 
 #include "stability/bounds/enclosures/contracting_system.h"
+#include "stability/bounds/enclosures/enclosed_state.h"
 
 namespace swarmcert::stability {
 namespace {
 
-constexpr int kTaylorTerms = 18;
 constexpr double kLargestStep_s = 1e-3;
-
-double length_above(const std::vector<double>& w) {
-  Interval total;
-  for (const double x : w) total += Interval(x) * x;
-  return sqrt(total).upper;
-}
-
-/// exp(A step) up to `remainder` in the 2-norm.
-struct Step {
-  IntervalMatrix matrix;
-  double remainder = 0;
-};
-
-/// @param size upper bound on |A| step, at most 1.
-Step exponential(const IntervalMatrix& A, double step_s, double size) {
-  const std::size_t n = A.size();
-  IntervalMatrix power(n);
-  for (std::size_t i = 0; i < n; ++i) power(i, i) = 1;
-  Step step{power, 0};
-  for (int k = 1; k < kTaylorTerms; ++k) {
-    power = power * A;
-    for (std::size_t i = 0; i < n; ++i) {
-      for (std::size_t j = 0; j < n; ++j) {
-        power(i, j) = power(i, j) * Interval(step_s) / Interval(k);
-        step.matrix(i, j) += power(i, j);
-      }
-    }
-  }
-  // Remainder: size^18/18! (1 + size/19 + ...) with size <= 1, and 18! > 6.4e15. The series is below 1.06; the factor
-  // 1.1 also covers round-off.
-  step.remainder = 1.1 * nth_power(Interval(size * 1.000001), kTaylorTerms).upper / 6.4e15;
-  return step;
-}
-
-/// The true state is within `error` of w in the 2-norm.
-struct EnclosedState {
-  std::vector<double> w;
-  double error = 0;
-
-  explicit EnclosedState(const std::vector<Interval>& b) : w(b.size()) {
-    for (std::size_t i = 0; i < b.size(); ++i) {
-      w[i] = (b[i].lower + b[i].upper) / 2;
-      error = up(error + (b[i].upper - b[i].lower));
-    }
-  }
-
-  double largest_norm() const { return up(length_above(w) + error); }
-
-  /// Encloses row x state. @param row_norm upper bound on |row|.
-  Interval value(const std::vector<Interval>& row, double row_norm) const {
-    const double missed = up(row_norm * error);
-    return dot(row, w) + Interval(-missed, missed);
-  }
-
-  void advance(const Step& step) {
-    std::vector<double> next(w.size());
-    Interval missed;
-    for (std::size_t i = 0; i < w.size(); ++i) {
-      Interval total;
-      for (std::size_t j = 0; j < w.size(); ++j) total += step.matrix(i, j) * w[j];
-      next[i] = total.lower + (total.upper - total.lower) / 2;
-      const double half = up(std::max(total.upper - next[i], next[i] - total.lower));
-      missed += Interval(half) * half;
-    }
-    error = up(up(error + sqrt(missed).upper) + up(step.remainder * length_above(w)));
-    w = std::move(next);
-  }
-};
-
-double frobenius_above(const IntervalMatrix& A) {
-  Interval squares;
-  for (std::size_t i = 0; i < A.size(); ++i) {
-    for (std::size_t j = 0; j < A.size(); ++j) {
-      const double entry = A(i, j).mag();
-      squares += Interval(entry) * entry;
-    }
-  }
-  return sqrt(squares).upper;
-}
 
 }  // namespace
 
@@ -105,21 +26,14 @@ Interval KernelCells::whole_net(std::size_t k) const {
   return result;
 }
 
-std::optional<KernelCells> kernel_cells(const TransferFunction& y, double cell_s, int count) {
-  if (y.delay_s > 0) return std::nullopt;
-  const Polynomial denominator = sum(y.denominator, y.feedback);
-  return kernel_cells(IntervalVector(y.numerator.begin(), y.numerator.end()),
-                      IntervalVector(denominator.begin(), denominator.end()), cell_s, count);
-}
-
 std::optional<KernelCells> kernel_cells(const IntervalVector& numerator, const IntervalVector& denominator,
                                         double cell_s, int count) {
   const std::optional<ContractingSystem> system = contracting(numerator, denominator);
   if (!system) return std::nullopt;
-  const double norm_A = frobenius_above(system->A);
+  const double norm_A = norm_above(system->A);
   const int parts = static_cast<int>(std::ceil(cell_s / std::min(kLargestStep_s, 0.5 / norm_A)));
   const double step_s = cell_s / parts;  // parts step_s equals cell_s up to round-off, which is covered below
-  const Step step = exponential(system->A, step_s, up(norm_A * step_s));
+  const EnclosedStep step(system->A, step_s, up(norm_A * step_s));
   const double bend_norm = norm_above(system->rows[3]);
 
   const double row_norm = norm_above(system->rows[1]);
@@ -178,9 +92,7 @@ std::vector<double> convolved(const KernelCells& kernel, const std::vector<doubl
 }
 
 Interval answer(const KernelCells& kernel, std::size_t m, Interval w) {
-  const double centre = w.lower + (w.upper - w.lower) / 2;
-  const double radius = up(std::max(w.upper - centre, centre - w.lower));
-  const double spread = up(kernel.integral[m] * up(radius));
+  const double centre = middle(w), spread = up(kernel.integral[m] * farthest(w, centre));
   return kernel.whole_net(m) * centre + Interval(-spread, spread);
 }
 
@@ -193,17 +105,16 @@ Interval answer_to_past(const KernelCells& kernel, const std::vector<Interval>& 
   std::vector<double> by_mode(kernel.modes.size(), 0.0);
   for (std::size_t m = 1; m <= n; ++m) {
     const Interval both = hull(w[n - m], m < n ? w[n - m - 1] : Interval(0));
-    const double c = both.lower + (both.upper - both.lower) / 2;
-    const double radius = std::max(both.upper - c, c - both.lower);
+    const double c = middle(both);
     const Interval& net = kernel.net[m];
-    const double g = net.lower + (net.upper - net.lower) / 2;
+    const double g = middle(net);
     centre += g * c;
     size += std::abs(g * c);
     for (std::size_t i = 0; i < by_mode.size(); ++i) {
       by_mode[i] += kernel.modes[i][m] * c;
       size += std::abs(kernel.modes[i][m] * c);
     }
-    spread += kernel.integral[m] * radius + std::max(net.upper - g, g - net.lower) * std::abs(c);
+    spread += kernel.integral[m] * farthest(both, c) + farthest(net, g) * std::abs(c);
   }
   for (const double x : by_mode) spread += std::abs(x);
   spread += 4e-16 * static_cast<double>(n + 8) * (size + spread) + 1e-300;

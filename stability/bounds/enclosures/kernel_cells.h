@@ -6,7 +6,6 @@
 
 #include "nn/base/interval.h"
 #include "stability/bounds/enclosures/interval_matrix.h"
-#include "stability/bounds/loops/impulse_response.h"
 
 namespace swarmcert::stability {
 
@@ -26,10 +25,8 @@ struct KernelCells {
 /// Computes the bounds in steps of a millisecond or less, in coordinates in which the system contracts
 /// (contracting_system.h), so that errors of the computed state never grow. Within a step |y| <= max of both
 /// ends + step^2/8 sup|y''|.
-/// @param y without a delay, strictly proper.
+/// @param numerator, denominator in ascending powers, strictly proper; the bounds hold for all coefficients in them.
 /// @returns nothing if stability could not be verified.
-std::optional<KernelCells> kernel_cells(const TransferFunction& y, double cell_s, int count);
-/// The same for all transfer functions with these coefficients, in ascending powers.
 std::optional<KernelCells> kernel_cells(const IntervalVector& numerator, const IntervalVector& denominator,
                                         double cell_s, int count);
 

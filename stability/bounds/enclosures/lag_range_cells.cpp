@@ -18,8 +18,6 @@ IntervalVector at(const IntervalVector& a, const IntervalVector& b, double tau) 
   return result;
 }
 
-double middle(Interval x) { return x.lower + (x.upper - x.lower) / 2; }
-
 /// Bounds kernel * y, given the integrals of |kernel| over cells and |y| <= sizes.
 std::vector<double> answered(const std::vector<double>& integral, const std::vector<double>& sizes) {
   KernelCells kernel;

@@ -1,28 +1,23 @@
 #include "stability/bounds/enclosures/verified_norms.h"
 
-#include <Eigen/Core>
 #include <algorithm>
 #include <array>
 #include <cmath>
 
 #include "nn/base/doubles.h"
 #include "stability/bounds/enclosures/contracting_system.h"
+#include "stability/bounds/enclosures/enclosed_state.h"
 #include "stability/bounds/enclosures/local_polynomial.h"
-#include "stability/bounds/enclosures/verified_delay.h"
 
 namespace swarmcert::stability {
 namespace {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
-
 class Enclosure {
  public:
-  explicit Enclosure(const ContractingSystem& system) : system_(system) {
-    const std::size_t n = system.A.size();
-    Interval largest;
-    for (std::size_t i = 0; i < n; ++i) largest += dot_row(i);
-    length_ = 0.25 / sqrt(largest).upper;  // |A| <= its Frobenius norm
+  explicit Enclosure(const ContractingSystem& system)
+      : system_(system),
+        length_(kShare / norm_above(system.A)),
+        step_(system.A, length_, kShare * (1 + 1e-12)) {
     for (std::size_t r = 0; r < 4; ++r) {
       taylor_[r][0] = system.rows[r];
       for (std::size_t k = 1; k <= kLocalTerms; ++k) {
@@ -32,56 +27,33 @@ class Enclosure {
       row_norm_[r] = norm_above(taylor_[r][0]);
       remainder_norm_[r] = norm_above(taylor_[r][kLocalTerms]);
     }
-    // exp(A length) in intervals, by its Taylor sum; the remainder is bounded in norm.
-    IntervalMatrix power(MatrixXd::Identity(static_cast<Index>(n), static_cast<Index>(n)));
-    IntervalMatrix total = power;
-    for (int k = 1; k < kLocalTerms; ++k) {
-      power = power * system.A;
-      for (std::size_t i = 0; i < n; ++i) {
-        for (std::size_t j = 0; j < n; ++j) {
-          power(i, j) = power(i, j) * Interval(length_) / Interval(k);
-          total(i, j) += power(i, j);
-        }
-      }
-    }
-    step_ = std::vector<Interval>(n * n);
-    for (std::size_t i = 0; i < n; ++i) {
-      for (std::size_t j = 0; j < n; ++j) step_[i * n + j] = total(i, j);
-    }
-    step_remainder_ = 2 * std::pow(0.2500001, kLocalTerms) / 6.4e15;  // 0.25^18/18! plus the following terms
   }
 
   /// @param y index of the row of h': 2 with an integral, where the system's response is h; 1 without.
   /// @param settled limit of h.
   VerifiedNorms run(std::size_t y, Interval settled) {
-    const std::size_t n = system_.A.size();
-    std::vector<double> w(n);
-    double error = 0;
-    for (std::size_t i = 0; i < n; ++i) {
-      w[i] = (system_.b[i].lower + system_.b[i].upper) / 2;
-      error = up(error + (system_.b[i].upper - system_.b[i].lower));
-    }
-    const double first = length(w);
+    EnclosedState state(system_.b);
+    double size = state.largest_norm();
+    const double first = size;
     VerifiedNorms norms;
     AbsoluteIntegral rate;
     AbsoluteIntegral amplitude;
     double best_value = 0;
     double best_slope = 0;
-    double size = first;
-    for (long step = 0; size > std::max(1e-13 * first, 1e3 * error) && step < 4'000'000; ++step) {
+    for (long step = 0; size > std::max(1e-13 * first, 1e3 * state.error) && step < 4'000'000; ++step) {
       std::array<LocalPolynomial, 4> local;
       for (std::size_t r = 0; r < 4; ++r) {
-        for (std::size_t k = 0; k < kLocalTerms; ++k) local[r].c[k] = dot(taylor_[r][k], w);
+        for (std::size_t k = 0; k < kLocalTerms; ++k) local[r].c[k] = dot(taylor_[r][k], state.w);
         local[r].remainder = up(remainder_norm_[r] * size * (1 + 1e-12));
-        local[r].error = up(row_norm_[r] * error);
+        local[r].error = up(row_norm_[r] * state.error);
       }
       local[y - 1].c[0] += settled;
       if (y == 2) rate.add(local[1], local[0], 0, length_, kLocalDepth);
       amplitude.add(local[y], local[y - 1], 0, length_, kLocalDepth);
       raise_supremum(local[y - 1], local[y], 0, length_, kLocalDepth, best_value, norms.edge);
       raise_supremum(local[y], local[y + 1], 0, length_, kLocalDepth, best_slope, norms.impulse);
-      advance(w, error);
-      size = length(w) + error;
+      state.advance(step_);
+      size = state.largest_norm();
     }
     const double tail = up(size / system_.alpha);
     norms.rate = y == 2 ? rate.finish() + Interval(0, up(row_norm_[1] * tail)) : Interval(kInfinity);
@@ -93,41 +65,14 @@ class Enclosure {
   }
 
  private:
-  Interval dot_row(std::size_t i) const {
-    Interval total;
-    for (std::size_t j = 0; j < system_.A.size(); ++j)
-      total += Interval(system_.A(i, j).mag()) * system_.A(i, j).mag();
-    return total;
-  }
-  static double length(const std::vector<double>& w) {
-    Interval total;
-    for (const double x : w) total += Interval(x) * x;
-    return sqrt(total).upper;
-  }
-
-  void advance(std::vector<double>& w, double& error) const {
-    const std::size_t n = w.size();
-    std::vector<double> next(n);
-    Interval missed;
-    for (std::size_t i = 0; i < n; ++i) {
-      Interval total;
-      for (std::size_t j = 0; j < n; ++j) total += step_[i * n + j] * w[j];
-      next[i] = total.lower + (total.upper - total.lower) / 2;
-      const double half = up(std::max(total.upper - next[i], next[i] - total.lower));
-      missed += Interval(half) * half;
-    }
-    // The flow contracts, so the previous error does not grow.
-    error = up(up(error + sqrt(missed).upper) + step_remainder_ * length(w));
-    w = std::move(next);
-  }
+  static constexpr double kShare = 0.25;  ///< |A| times the length of a step
 
   const ContractingSystem& system_;
-  double length_ = 0;
+  double length_;
+  EnclosedStep step_;
   std::array<std::array<IntervalVector, kLocalTerms + 1>, 4> taylor_;
   std::array<double, 4> row_norm_{};
   std::array<double, 4> remainder_norm_{};
-  std::vector<Interval> step_;
-  double step_remainder_ = 0;
 };
 
 IntervalVector intervals(const Polynomial& p) { return IntervalVector(p.begin(), p.end()); }
@@ -168,8 +113,7 @@ std::optional<VerifiedNorms> norms_over(const TransferFunction& y, const Interva
 }
 
 VerifiedNorms times(VerifiedNorms norms, Interval factor) {
-  for (const auto gain :
-       {&VerifiedNorms::rate, &VerifiedNorms::amplitude, &VerifiedNorms::edge, &VerifiedNorms::impulse}) {
+  for (const auto gain : kVerifiedGains) {
     if (std::isfinite((norms.*gain).upper)) norms.*gain = norms.*gain * factor;
   }
   return norms;
@@ -178,11 +122,7 @@ VerifiedNorms times(VerifiedNorms norms, Interval factor) {
 /// @param integrates true: y is the response to a step; false: that to an impulse.
 std::optional<VerifiedNorms> norms_of(const TransferFunction& y, bool integrates) {
   if (y.delay_s == 0) return norms_over(y, intervals(sum(y.denominator, y.feedback)), integrates);
-  // A delay that is short compared with the slowest mode takes many steps, but its expansion may be accurate.
-  constexpr long kFewPieces = 30'000;
-  constexpr long kMostPieces = 400'000;
   constexpr double kSharp = 1e-3;
-  if (const auto norms = norms_by_steps(y, integrates, kFewPieces)) return norms;
   std::size_t order = y.denominator.size() - y.feedback.size();
   IntervalVector denominator;
   double rest = kInfinity;
@@ -191,16 +131,12 @@ std::optional<VerifiedNorms> norms_of(const TransferFunction& y, bool integrates
     const double missed = rest_of_delay(y, order, expanded);
     if (missed < rest) rest = missed, denominator = std::move(expanded);
   }
-  if (!(rest < kSharp)) {
-    if (const auto norms = norms_by_steps(y, integrates, kMostPieces)) return norms;
-  }
   if (!(rest < 1)) return std::nullopt;
   std::optional<VerifiedNorms> norms = norms_over(y, denominator, integrates);
   if (!norms) return std::nullopt;
   const Interval more = Interval(1) / (Interval(1) - Interval(rest));
   const Interval less = Interval(1) / (Interval(1) + Interval(rest));
-  for (const auto gain :
-       {&VerifiedNorms::rate, &VerifiedNorms::amplitude, &VerifiedNorms::edge, &VerifiedNorms::impulse}) {
+  for (const auto gain : kVerifiedGains) {
     Interval& x = *norms.*gain;
     if (std::isfinite(x.upper)) x = {(x * less).lower, (x * more).upper};
   }

@@ -28,9 +28,8 @@ struct Linear {
   explicit Linear(const IntervalVector& c) {
     double radius = 0;
     for (const Interval& x : c) {
-      mid.push_back(x.lower + (x.upper - x.lower) / 2);
-      const double r = up(std::max(x.upper - mid.back(), mid.back() - x.lower));
-      radius = up(radius + r);
+      mid.push_back(middle(x));
+      radius = up(radius + farthest(x, mid.back()));
     }
     per_error = norm_above(c) * kOver;
     // gamma_n of a dot product, plus the same amount for the few operations on its result.
@@ -115,18 +114,15 @@ class SampledEnclosure {
     const std::size_t n = model.size();
     A_.resize(n * n);
     Interval radius;
-    Interval size;
     for (std::size_t i = 0; i < n; ++i) {
       for (std::size_t j = 0; j < n; ++j) {
         const Interval a = system_.A(i, j);
-        const double mid = a.lower + (a.upper - a.lower) / 2;
-        A_[j * n + i] = mid;
-        const double r = up(std::max(a.upper - mid, mid - a.lower));
+        A_[j * n + i] = middle(a);
+        const double r = farthest(a, middle(a));
         radius += Interval(r) * r;
-        size += Interval(a.mag()) * a.mag();
       }
     }
-    step_error_ = (sqrt(radius).upper + 2.3e-16 * static_cast<double>(n + 2) * sqrt(size).upper) * kOver;
+    step_error_ = (sqrt(radius).upper + 2.3e-16 * static_cast<double>(n + 2) * norm_above(system_.A)) * kOver;
     gap_ = Interval(1) - Interval(system_.gamma);
     IntervalVector k0(n);
     IntervalVector k1(n);
@@ -163,10 +159,10 @@ class SampledEnclosure {
     std::vector<double> next(n);
     double error = 0;
     for (std::size_t i = 0; i < n; ++i) {
-      row[i] = output.row[i].lower + (output.row[i].upper - output.row[i].lower) / 2;
+      row[i] = middle(output.row[i]);
       error = up(error + up(output.row[i].upper - output.row[i].lower));
     }
-    const double settled = (output.settled.lower + output.settled.upper) / 2;
+    const double settled = middle(output.settled);
     const double settled_error =
         up(output.settled.upper - output.settled.lower) + 1e-15 * output.settled.mag();
     Runs of_S;
@@ -185,7 +181,8 @@ class SampledEnclosure {
       if (least > cell.k_error) {
         of_S.add(cell.k0 > 0 ? 1 : -1, [&] { return cell.S(0); });
       } else {
-        split_k(cell, 0, h_, kDepth, of_S);
+        follow([&](double a, double b) { return hull(cell.k(a), cell.k(b)); },
+               [&](double a) { return cell.S(a); }, cell.k_error, 0, h_, kDepth, of_S);
       }
       if (integrates_) add_second(cell, most, of_Q);
       advance(row, next, length, error);
@@ -233,7 +230,7 @@ class SampledEnclosure {
     Eigen::VectorXd right(static_cast<Index>(n));
     for (std::size_t i = 0; i < n; ++i) {
       for (std::size_t j = 0; j < n; ++j) left(static_cast<Index>(i), static_cast<Index>(j)) -= A_[j * n + i];
-      right[static_cast<Index>(i)] = (c[i].lower + c[i].upper) / 2;
+      right[static_cast<Index>(i)] = middle(c[i]);
     }
     const Eigen::VectorXd solved = left.fullPivLu().solve(right);
     IntervalVector residual = c;
@@ -273,19 +270,19 @@ class SampledEnclosure {
     cell.Q_error = (off(second_rest_) + h_ * cell.S_error) * kOver;
   }
 
-  void split_k(const Cell& cell, double a, double b, int depth, Runs& runs) const {
-    const Interval range = hull(cell.k(a), cell.k(b));
-    if (range.lower > 0 || range.upper < 0) {
-      runs.add(range.lower > 0 ? 1 : -1, [&] { return cell.S(a); });
-      return;
-    }
-    if (depth == 0 || 8 * cell.k_error > range.mag()) {
-      runs.add_unsure(cell.S(a), up(up(b - a) * range.mag()));
-      return;
-    }
+  /// Adds the runs of one sign of a function on [a, b], halved where its sign is not sure.
+  /// @param range_on encloses the function on an interval. @param integral_at its antiderivative
+  template <class RangeOn, class IntegralAt>
+  static void follow(const RangeOn& range_on, const IntegralAt& integral_at, double error, double a, double b,
+                     int depth, Runs& runs) {
+    const Interval range = range_on(a, b);
+    if (range.lower > 0 || range.upper < 0)
+      return runs.add(range.lower > 0 ? 1 : -1, [&] { return integral_at(a); });
+    if (depth == 0 || 8 * error > range.mag())
+      return runs.add_unsure(integral_at(a), up(up(b - a) * range.mag()));
     const double middle = a + (b - a) / 2;
-    split_k(cell, a, middle, depth - 1, runs);
-    split_k(cell, middle, b, depth - 1, runs);
+    follow(range_on, integral_at, error, a, middle, depth - 1, runs);
+    follow(range_on, integral_at, error, middle, b, depth - 1, runs);
   }
 
   void add_second(const Cell& cell, double k_most, Runs& runs) const {
@@ -301,23 +298,13 @@ class SampledEnclosure {
     if (std::abs(cell.S0) > (h_ * (k_most + cell.k_error) + cell.S_error) * kOver) {
       runs.add(cell.S0 > 0 ? 1 : -1, [&] { return cell.Q(0); });
     } else {
-      split_S(cell, 0, h_, kDepth, runs);
+      const auto range_on = [&](double a, double b) {
+        const double middle = a + (b - a) / 2;
+        return cell.S(middle) + hull(cell.k(a), cell.k(b)) * (Interval(a, b) - Interval(middle));
+      };
+      follow(
+          range_on, [&](double a) { return cell.Q(a); }, cell.S_error, 0, h_, kDepth, runs);
     }
-  }
-
-  void split_S(const Cell& cell, double a, double b, int depth, Runs& runs) const {
-    const double middle = a + (b - a) / 2;
-    const Interval range = cell.S(middle) + hull(cell.k(a), cell.k(b)) * (Interval(a, b) - Interval(middle));
-    if (range.lower > 0 || range.upper < 0) {
-      runs.add(range.lower > 0 ? 1 : -1, [&] { return cell.Q(a); });
-      return;
-    }
-    if (depth == 0 || 8 * cell.S_error > range.mag()) {
-      runs.add_unsure(cell.Q(a), up(up(b - a) * range.mag()));
-      return;
-    }
-    split_S(cell, a, middle, depth - 1, runs);
-    split_S(cell, middle, b, depth - 1, runs);
   }
 
   void advance(const std::vector<double>& row, std::vector<double>& next, double length,
@@ -341,9 +328,6 @@ class SampledEnclosure {
   double step_error_ = 0;
   Linear k0_, k1_, rest_, second_rest_;
 };
-
-constexpr std::array<Interval VerifiedNorms::*, 4> kSampledGains = {
-    &VerifiedNorms::rate, &VerifiedNorms::amplitude, &VerifiedNorms::edge, &VerifiedNorms::impulse};
 
 Interval dot(const IntervalVector& row, const IntervalVector& column) {
   Interval total;
@@ -369,7 +353,7 @@ std::optional<VerifiedSampledNorms> enclosed_norms(const SampledLoop& loop, cons
     const double phase_s = loop.period_s * i / kVerifiedPhases;
     const VerifiedNorms here = output(model.error_at(phase_s), phase_s, at_rest);
     if (i == 0) result.at_samples = result.all_times = here;
-    for (const auto gain : kSampledGains) {
+    for (const auto gain : kVerifiedGains) {
       Interval& all = result.all_times.*gain;
       all = {std::max(all.lower, (here.*gain).lower), std::max(all.upper, (here.*gain).upper)};
     }
@@ -381,7 +365,7 @@ std::optional<VerifiedSampledNorms> enclosed_norms(const SampledLoop& loop, cons
     IntervalVector after(model.size() + 1);
     after[i < model.lags() ? 2 + i : model.command_index()] = 1;
     const VerifiedNorms here = output(after, 0, Interval(0));
-    for (const auto gain : kSampledGains)
+    for (const auto gain : kVerifiedGains)
       (bend.*gain).upper = std::max((bend.*gain).upper, (here.*gain).upper);
   }
   if (is_force) {
@@ -391,7 +375,7 @@ std::optional<VerifiedSampledNorms> enclosed_norms(const SampledLoop& loop, cons
   }
   bend.edge = bend.amplitude;  // an input of total variation 1 from rest stays below 1
   const double step_s = up(loop.period_s / kVerifiedPhases * (1 + 1e-15));
-  for (const auto gain : kSampledGains) {
+  for (const auto gain : kVerifiedGains) {
     Interval& all = result.all_times.*gain;
     if (std::isfinite(all.upper))
       all.upper = (Interval(all.upper) + Interval(step_s) * step_s / Interval(8) * (bend.*gain).upper).upper;
@@ -402,7 +386,7 @@ std::optional<VerifiedSampledNorms> enclosed_norms(const SampledLoop& loop, cons
 /// Divides every finite gain by `divisor`.
 VerifiedSampledNorms over(VerifiedSampledNorms result, Interval divisor) {
   for (VerifiedNorms* const norms : {&result.at_samples, &result.all_times}) {
-    for (const auto gain : kSampledGains) {
+    for (const auto gain : kVerifiedGains) {
       if (std::isfinite((norms->*gain).upper)) norms->*gain = norms->*gain / divisor;
     }
   }

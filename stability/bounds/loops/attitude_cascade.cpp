@@ -53,19 +53,12 @@ struct CutLoop {
 TransferFunction cascade_transfer(const Cascade& loop, CascadeInput input) {
   const CutLoop cut(loop);
   const int position_zeros = cut.outer - 2;
-  Polynomial numerator;
-  switch (input) {
-    case CascadeInput::kAcceleration:
-      numerator = cut.attitude_denominator();
-      break;
-    case CascadeInput::kVelocityError:
-      numerator = scaled(cut.stiffness, loop.ratio * loop.Kd);
-      break;
-    case CascadeInput::kAngularAcceleration:
-      if (!loop.attitude) throw std::invalid_argument("cascade_transfer: no attitude loop to disturb");
-      numerator = scaled(times_s_to(cut.inner - 2, cut.lag), kGravity_m_s2);
-      break;
-  }
+  if (input == CascadeInput::kAngularAcceleration && !loop.attitude)
+    throw std::invalid_argument("cascade_transfer: no attitude loop to disturb");
+  Polynomial numerator = input == CascadeInput::kAcceleration ? cut.attitude_denominator()
+                         : input == CascadeInput::kVelocityError
+                             ? scaled(cut.stiffness, loop.ratio * loop.Kd)
+                             : scaled(times_s_to(cut.inner - 2, cut.lag), kGravity_m_s2);
   return {times_s_to(position_zeros, std::move(numerator)), sum(cut.open(), cut.feedback()), {}, 0};
 }
 

@@ -1,7 +1,6 @@
 #include "stability/bounds/swarms/coupled_swarm.h"
 
 #include <cmath>
-#include <sstream>
 #include <stdexcept>
 
 #include "nn/base/file_io.h"
@@ -12,12 +11,6 @@
 
 namespace swarmcert::stability {
 namespace {
-
-std::string number_text(double value) {
-  std::ostringstream text;
-  text << value;
-  return text.str();
-}
 
 constexpr const char* kSwarmSchema = "swarmcert/swarm/1";
 const std::vector<std::string> kDirections = {"apart", "together"};
@@ -49,7 +42,7 @@ CoupledSwarm read_coupled_swarm(const std::string& path) {
   top.allow_only(files::key_names(describe_swarm_file));
   const double vehicles = top.number("vehicles");
   if (!(vehicles >= 1 && vehicles <= 200) || vehicles != std::floor(vehicles)) {
-    top.refuse("vehicles", number_text(vehicles), "must be a whole number from 1 to 200");
+    top.refuse("vehicles", decimals(vehicles), "must be a whole number from 1 to 200");
   }
   CoupledSwarm swarm;
   swarm.vehicles = static_cast<int>(vehicles);
@@ -58,13 +51,13 @@ CoupledSwarm read_coupled_swarm(const std::string& path) {
     const auto vehicle = [&](const char* key) {
       const double value = table.number(key);
       if (!(value >= 0 && value < vehicles) || value != std::floor(value)) {
-        table.refuse(key, number_text(value), "must be a vehicle from 0 to " + number_text(vehicles - 1));
+        table.refuse(key, decimals(value), "must be a vehicle from 0 to " + decimals(vehicles - 1));
       }
       return static_cast<int>(value);
     };
     const auto number = [&](const char* key) {
       const double value = table.has(key) ? table.number(key) : 0;
-      if (value < 0) table.refuse(key, number_text(value), "must not be negative");
+      if (value < 0) table.refuse(key, decimals(value), "must not be negative");
       return value;
     };
     Coupling c{vehicle("on"),           vehicle("by"),

@@ -214,6 +214,15 @@ module Pos =
       (fun _ -> Big.one)
       p
 
+  (** val size : Big.t -> Big.t **)
+
+  let rec size p =
+    (fun _ _ _ _ -> assert false)
+      (fun p0 -> succ (size p0))
+      (fun p0 -> succ (size p0))
+      (fun _ -> Big.one)
+      p
+
   (** val compare_cont : comparison -> Big.t -> Big.t -> comparison **)
 
   let rec compare_cont r x y =
@@ -1333,8 +1342,8 @@ type claim =
 | Within of int * box * box
 | Sum_within of int list list * term list * int * box
 | Jump_at_most of int * box * int * dyadic
-| Float_error of int * box * dyadic list * dyadic list * dyadic
-| Sum_float_error of (term * dyadic list) list * int * dyadic
+| Float_error of bool * int * box * dyadic list * dyadic list * dyadic
+| Sum_float_error of bool * (term * dyadic list) list * int * dyadic
 | Slope_among of int * int * bool list * dyadic list * box * term list
    * dyadic
 | Law_among of bool * ((kind * box) * Big.t) list * int * dyadic
@@ -1524,296 +1533,6 @@ let minusD u v =
 
 let squareD u =
   dot zero add0 mul0 u u
-
-(** val at_most : dyadic -> dyadic -> bool **)
-
-let at_most x y =
-  is_nonnegative (add0 y (neg x))
-
-(** val clampedD : (dyadic * dyadic) list -> dyadic list -> dyadic list **)
-
-let rec clampedD c x =
-  match c with
-  | [] -> x
-  | p :: c' ->
-    let (low, high) = p in
-    (match x with
-     | [] -> x
-     | a :: x' ->
-       let b = if at_most a low then low else a in
-       (if at_most b high then b else high) :: (clampedD c' x'))
-
-(** val same : dyadic -> dyadic -> bool **)
-
-let same x y =
-  (&&) (Big.equal (fst x) (fst y)) (Big.equal (snd x) (snd y))
-
-(** val same_numbers : dyadic list -> dyadic list -> bool **)
-
-let rec same_numbers x y =
-  match x with
-  | [] -> (match y with
-           | [] -> true
-           | _ :: _ -> false)
-  | a :: x' ->
-    (match y with
-     | [] -> false
-     | b :: y' -> (&&) (same a b) (same_numbers x' y'))
-
-(** val same_box : box -> box -> bool **)
-
-let rec same_box x y =
-  match x with
-  | [] -> (match y with
-           | [] -> true
-           | _ :: _ -> false)
-  | a :: x' ->
-    (match y with
-     | [] -> false
-     | b :: y' ->
-       (&&) ((&&) (same (fst a) (fst b)) (same (snd a) (snd b)))
-         (same_box x' y'))
-
-(** val contains : box -> box -> bool **)
-
-let rec contains a b =
-  match a with
-  | [] -> (match b with
-           | [] -> true
-           | _ :: _ -> false)
-  | p :: a' ->
-    let (l, h) = p in
-    (match b with
-     | [] -> false
-     | p0 :: b' ->
-       let (l', h') = p0 in
-       (&&) ((&&) (at_most l l') (at_most h' h)) (contains a' b'))
-
-(** val clamp_ends : (dyadic * dyadic) list -> box -> box **)
-
-let clamp_ends c b =
-  combine (clampedD c (map fst b)) (clampedD c (map snd b))
-
-(** val relu_ends : (dyadic * dyadic) -> dyadic * dyadic **)
-
-let relu_ends i =
-  ((reluD (fst i)), (reluD (snd i)))
-
-(** val larger : dyadic -> dyadic -> dyadic **)
-
-let larger x y =
-  if at_most x y then y else x
-
-(** val largest_abs : (dyadic * dyadic) -> dyadic **)
-
-let largest_abs i =
-  larger (abs (fst i)) (abs (snd i))
-
-(** val row_ends : dyadic list -> box -> dyadic * dyadic **)
-
-let rec row_ends row b =
-  match row with
-  | [] -> (zero, zero)
-  | w :: row' ->
-    (match b with
-     | [] -> (zero, zero)
-     | p :: b' ->
-       let (l, h) = p in
-       let (s, t) = row_ends row' b' in
-       if is_nonnegative w
-       then ((add0 (mul0 w l) s), (add0 (mul0 w h) t))
-       else ((add0 (mul0 w h) s), (add0 (mul0 w l) t)))
-
-(** val encloses : matrixD -> dyadic list -> box -> box -> bool **)
-
-let rec encloses w c b v =
-  match w with
-  | [] ->
-    (match c with
-     | [] -> (match v with
-              | [] -> true
-              | _ :: _ -> false)
-     | _ :: _ -> false)
-  | row :: w' ->
-    (match c with
-     | [] -> false
-     | a :: c' ->
-       (match v with
-        | [] -> false
-        | p :: v' ->
-          let (l, h) = p in
-          let (s, t) = row_ends row b in
-          (&&) ((&&) (at_most l (add0 s a)) (at_most (add0 t a) h))
-            (encloses w' c' b v')))
-
-(** val check_layers :
-    layerD list -> layerD -> box -> box list -> box -> bool **)
-
-let rec check_layers hidden0 last0 b bounds0 v =
-  match hidden0 with
-  | [] ->
-    (match bounds0 with
-     | [] -> encloses (fst last0) (snd last0) b v
-     | _ :: _ -> false)
-  | l :: hidden' ->
-    (match bounds0 with
-     | [] -> false
-     | c :: bounds' ->
-       (&&) (encloses (fst l) (snd l) b c)
-         (check_layers hidden' last0 (map relu_ends c) bounds' v))
-
-(** val sizes : box -> dyadic list -> dyadic list **)
-
-let rec sizes b r =
-  match b with
-  | [] -> []
-  | i :: b' ->
-    (match r with
-     | [] -> []
-     | a :: r' -> (add0 (largest_abs i) a) :: (sizes b' r'))
-
-(** val size : 'a1 list -> Big.t **)
-
-let rec size = function
-| [] -> Big.zero
-| _ :: l' -> Big.add ((fun p -> p) Big.one) (size l')
-
-(** val gammaD : Big.t -> dyadic **)
-
-let gammaD n =
-  let x = (n, (Big.neg ((fun p -> Big.shift_left p 1)
-    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
-    ((fun p -> Big.succ (Big.shift_left p 1)) Big.one))))))
-  in
-  add0 x (mul0 x x)
-
-(** val rounding_fits : Big.t -> dyadic -> dyadic -> dyadic -> bool **)
-
-let rounding_fits n m before e =
-  (&&)
-    ((&&)
-      (Big.leq n ((fun p -> p) ((fun p -> Big.shift_left p 1)
-        ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
-        ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
-        ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
-        ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
-        ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
-        ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
-        ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
-        ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
-        ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
-        ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
-        ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
-        Big.one)))))))))))))))))))))))))
-      (at_most
-        (add0 m (n, (Big.neg ((fun p -> Big.succ (Big.shift_left p 1))
-          ((fun p -> Big.shift_left p 1)
-          ((fun p -> Big.succ (Big.shift_left p 1))
-          ((fun p -> Big.shift_left p 1)
-          ((fun p -> Big.succ (Big.shift_left p 1))
-          ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
-          Big.one)))))))))) (((fun p -> p) Big.one), ((fun p -> p)
-        ((fun p -> Big.shift_left p 1)
-        ((fun p -> Big.succ (Big.shift_left p 1))
-        ((fun p -> Big.succ (Big.shift_left p 1))
-        ((fun p -> Big.succ (Big.shift_left p 1))
-        ((fun p -> Big.succ (Big.shift_left p 1))
-        ((fun p -> Big.succ (Big.shift_left p 1)) Big.one))))))))))
-    (at_most
-      (add0 before
-        (add0 (mul0 (gammaD n) m) (n, (Big.neg ((fun p -> Big.shift_left p 1)
-          ((fun p -> Big.shift_left p 1)
-          ((fun p -> Big.succ (Big.shift_left p 1))
-          ((fun p -> Big.shift_left p 1)
-          ((fun p -> Big.succ (Big.shift_left p 1))
-          ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
-          Big.one))))))))))) e)
-
-(** val layer_fits :
-    matrixD -> dyadic list -> dyadic list -> dyadic list -> dyadic list ->
-    bool **)
-
-let rec layer_fits w c m r e =
-  match w with
-  | [] ->
-    (match c with
-     | [] -> (match e with
-              | [] -> true
-              | _ :: _ -> false)
-     | _ :: _ -> false)
-  | row :: w' ->
-    (match c with
-     | [] -> false
-     | a :: c' ->
-       (match e with
-        | [] -> false
-        | x :: e' ->
-          let sizes_of_row = map abs row in
-          (&&)
-            (rounding_fits (Big.add ((fun p -> p) Big.one) (size row))
-              (add0 (abs a) (dot zero add0 mul0 sizes_of_row m))
-              (dot zero add0 mul0 sizes_of_row r) x) (layer_fits w' c' m r e')))
-
-(** val check_roundings :
-    layerD list -> layerD -> box -> dyadic list -> box list -> dyadic list
-    list -> dyadic list -> bool **)
-
-let rec check_roundings hidden0 last0 b r bounds0 errors e =
-  match hidden0 with
-  | [] ->
-    (match bounds0 with
-     | [] ->
-       (match errors with
-        | [] -> layer_fits (fst last0) (snd last0) (sizes b r) r e
-        | _ :: _ -> false)
-     | _ :: _ -> false)
-  | l :: hidden' ->
-    (match bounds0 with
-     | [] -> false
-     | c :: bounds' ->
-       (match errors with
-        | [] -> false
-        | s :: errors' ->
-          (&&)
-            ((&&) (encloses (fst l) (snd l) b c)
-              (layer_fits (fst l) (snd l) (sizes b r) r s))
-            (check_roundings hidden' last0 (map relu_ends c) s bounds'
-              errors' e)))
-
-(** val add_ends : Big.t -> Big.t -> box -> box -> box **)
-
-let rec add_ends low high v s =
-  match v with
-  | [] -> []
-  | p :: v' ->
-    let (l, h) = p in
-    (match s with
-     | [] -> []
-     | p0 :: s' ->
-       let (a, b) = p0 in
-       ((add0 (mul0 ((if is_nonnegative l then low else high), Big.zero) l) a),
-       (add0 (mul0 ((if is_nonnegative h then high else low), Big.zero) h) b)) :: 
-       (add_ends low high v' s'))
-
-(** val sum_fits :
-    Big.t -> dyadic list -> dyadic list -> dyadic list -> bool **)
-
-let rec sum_fits count0 m e errors =
-  match m with
-  | [] ->
-    (match e with
-     | [] -> (match errors with
-              | [] -> true
-              | _ :: _ -> false)
-     | _ :: _ -> false)
-  | a :: m' ->
-    (match e with
-     | [] -> false
-     | b :: e' ->
-       (match errors with
-        | [] -> false
-        | x :: errors' ->
-          (&&) (rounding_fits count0 a b x) (sum_fits count0 m' e' errors')))
 
 type fixed = Big.t * Big.t
 
@@ -2031,6 +1750,418 @@ let exp_of_minus x =
   else if Big.leq vanishing (snd x)
        then (Big.zero, (snd (exp_by_series ((fst x), vanishing))))
        else exp_by_series x
+
+(** val at_most : dyadic -> dyadic -> bool **)
+
+let at_most x y =
+  is_nonnegative (add0 y (neg x))
+
+(** val clampedD : (dyadic * dyadic) list -> dyadic list -> dyadic list **)
+
+let rec clampedD c x =
+  match c with
+  | [] -> x
+  | p :: c' ->
+    let (low, high) = p in
+    (match x with
+     | [] -> x
+     | a :: x' ->
+       let b = if at_most a low then low else a in
+       (if at_most b high then b else high) :: (clampedD c' x'))
+
+(** val same : dyadic -> dyadic -> bool **)
+
+let same x y =
+  (&&) (Big.equal (fst x) (fst y)) (Big.equal (snd x) (snd y))
+
+(** val same_numbers : dyadic list -> dyadic list -> bool **)
+
+let rec same_numbers x y =
+  match x with
+  | [] -> (match y with
+           | [] -> true
+           | _ :: _ -> false)
+  | a :: x' ->
+    (match y with
+     | [] -> false
+     | b :: y' -> (&&) (same a b) (same_numbers x' y'))
+
+(** val same_box : box -> box -> bool **)
+
+let rec same_box x y =
+  match x with
+  | [] -> (match y with
+           | [] -> true
+           | _ :: _ -> false)
+  | a :: x' ->
+    (match y with
+     | [] -> false
+     | b :: y' ->
+       (&&) ((&&) (same (fst a) (fst b)) (same (snd a) (snd b)))
+         (same_box x' y'))
+
+(** val contains : box -> box -> bool **)
+
+let rec contains a b =
+  match a with
+  | [] -> (match b with
+           | [] -> true
+           | _ :: _ -> false)
+  | p :: a' ->
+    let (l, h) = p in
+    (match b with
+     | [] -> false
+     | p0 :: b' ->
+       let (l', h') = p0 in
+       (&&) ((&&) (at_most l l') (at_most h' h)) (contains a' b'))
+
+(** val clamp_ends : (dyadic * dyadic) list -> box -> box **)
+
+let clamp_ends c b =
+  combine (clampedD c (map fst b)) (clampedD c (map snd b))
+
+(** val relu_ends : (dyadic * dyadic) -> dyadic * dyadic **)
+
+let relu_ends i =
+  ((reluD (fst i)), (reluD (snd i)))
+
+(** val larger : dyadic -> dyadic -> dyadic **)
+
+let larger x y =
+  if at_most x y then y else x
+
+(** val largest_abs : (dyadic * dyadic) -> dyadic **)
+
+let largest_abs i =
+  larger (abs (fst i)) (abs (snd i))
+
+(** val row_ends : dyadic list -> box -> dyadic * dyadic **)
+
+let rec row_ends row b =
+  match row with
+  | [] -> (zero, zero)
+  | w :: row' ->
+    (match b with
+     | [] -> (zero, zero)
+     | p :: b' ->
+       let (l, h) = p in
+       let (s, t) = row_ends row' b' in
+       if is_nonnegative w
+       then ((add0 (mul0 w l) s), (add0 (mul0 w h) t))
+       else ((add0 (mul0 w h) s), (add0 (mul0 w l) t)))
+
+(** val encloses : matrixD -> dyadic list -> box -> box -> bool **)
+
+let rec encloses w c b v =
+  match w with
+  | [] ->
+    (match c with
+     | [] -> (match v with
+              | [] -> true
+              | _ :: _ -> false)
+     | _ :: _ -> false)
+  | row :: w' ->
+    (match c with
+     | [] -> false
+     | a :: c' ->
+       (match v with
+        | [] -> false
+        | p :: v' ->
+          let (l, h) = p in
+          let (s, t) = row_ends row b in
+          (&&) ((&&) (at_most l (add0 s a)) (at_most (add0 t a) h))
+            (encloses w' c' b v')))
+
+(** val check_layers :
+    layerD list -> layerD -> box -> box list -> box -> bool **)
+
+let rec check_layers hidden0 last0 b bounds0 v =
+  match hidden0 with
+  | [] ->
+    (match bounds0 with
+     | [] -> encloses (fst last0) (snd last0) b v
+     | _ :: _ -> false)
+  | l :: hidden' ->
+    (match bounds0 with
+     | [] -> false
+     | c :: bounds' ->
+       (&&) (encloses (fst l) (snd l) b c)
+         (check_layers hidden' last0 (map relu_ends c) bounds' v))
+
+(** val sizes : box -> dyadic list -> dyadic list **)
+
+let rec sizes b r =
+  match b with
+  | [] -> []
+  | i :: b' ->
+    (match r with
+     | [] -> []
+     | a :: r' -> (add0 (largest_abs i) a) :: (sizes b' r'))
+
+(** val size0 : 'a1 list -> Big.t **)
+
+let rec size0 = function
+| [] -> Big.zero
+| _ :: l' -> Big.add ((fun p -> p) Big.one) (size0 l')
+
+(** val gammaD : Big.t -> dyadic **)
+
+let gammaD n =
+  let x = (n, (Big.neg ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+    ((fun p -> Big.succ (Big.shift_left p 1)) Big.one))))))
+  in
+  add0 x (mul0 x x)
+
+(** val any_rounding : Big.t -> dyadic -> dyadic option **)
+
+let any_rounding n m =
+  if (&&)
+       (Big.leq n ((fun p -> p) ((fun p -> Big.shift_left p 1)
+         ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+         ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+         ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+         ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+         ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+         ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+         ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+         ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+         ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+         ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+         ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+         Big.one)))))))))))))))))))))))))
+       (at_most
+         (add0 m (n, (Big.neg ((fun p -> Big.succ (Big.shift_left p 1))
+           ((fun p -> Big.shift_left p 1)
+           ((fun p -> Big.succ (Big.shift_left p 1))
+           ((fun p -> Big.shift_left p 1)
+           ((fun p -> Big.succ (Big.shift_left p 1))
+           ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+           Big.one)))))))))) (((fun p -> p) Big.one), ((fun p -> p)
+         ((fun p -> Big.shift_left p 1)
+         ((fun p -> Big.succ (Big.shift_left p 1))
+         ((fun p -> Big.succ (Big.shift_left p 1))
+         ((fun p -> Big.succ (Big.shift_left p 1))
+         ((fun p -> Big.succ (Big.shift_left p 1))
+         ((fun p -> Big.succ (Big.shift_left p 1)) Big.one)))))))))
+  then Some
+         (add0 (mul0 (gammaD n) m) (n, (Big.neg
+           ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+           ((fun p -> Big.succ (Big.shift_left p 1))
+           ((fun p -> Big.shift_left p 1)
+           ((fun p -> Big.succ (Big.shift_left p 1))
+           ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+           Big.one))))))))))
+  else None
+
+(** val rounding_fits : Big.t -> dyadic -> dyadic -> dyadic -> bool **)
+
+let rounding_fits n m before e =
+  match any_rounding n m with
+  | Some d -> at_most (add0 before d) e
+  | None -> false
+
+(** val one_rounding : dyadic -> dyadic **)
+
+let one_rounding m =
+  if is_positive m
+  then add0 (((fun p -> p) Big.one),
+         (Big.sub
+           (Big.add (snd m) ((fun a -> Big.of_int (Big.log2 a)) (fst m)))
+           ((fun p -> p) ((fun p -> Big.shift_left p 1)
+           ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+           ((fun p -> Big.succ (Big.shift_left p 1)) Big.one)))))))
+         (((fun p -> p) Big.one), (Big.neg ((fun p -> Big.shift_left p 1)
+         ((fun p -> Big.succ (Big.shift_left p 1))
+         ((fun p -> Big.succ (Big.shift_left p 1))
+         ((fun p -> Big.shift_left p 1)
+         ((fun p -> Big.succ (Big.shift_left p 1))
+         ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+         Big.one)))))))))
+  else (((fun p -> p) Big.one), (Big.neg ((fun p -> Big.shift_left p 1)
+         ((fun p -> Big.succ (Big.shift_left p 1))
+         ((fun p -> Big.succ (Big.shift_left p 1))
+         ((fun p -> Big.shift_left p 1)
+         ((fun p -> Big.succ (Big.shift_left p 1))
+         ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+         Big.one)))))))))
+
+(** val ordered_rounding :
+    dyadic list -> box -> (dyadic * dyadic) -> dyadic -> dyadic option **)
+
+let rec ordered_rounding row h s off =
+  match row with
+  | [] -> Some off
+  | w :: row' ->
+    (match h with
+     | [] -> Some off
+     | i :: h' ->
+       let p =
+         if is_nonnegative w
+         then ((mul0 w (fst i)), (mul0 w (snd i)))
+         else ((mul0 w (snd i)), (mul0 w (fst i)))
+       in
+       let t = ((add0 (fst s) (fst p)), (add0 (snd s) (snd p))) in
+       let d = add0 off (one_rounding (largest_abs p)) in
+       let m = add0 (largest_abs t) d in
+       if at_most (add0 (largest_abs p) m) (((fun p -> p) Big.one),
+            ((fun p -> p) ((fun p -> Big.shift_left p 1)
+            ((fun p -> Big.succ (Big.shift_left p 1))
+            ((fun p -> Big.succ (Big.shift_left p 1))
+            ((fun p -> Big.succ (Big.shift_left p 1))
+            ((fun p -> Big.succ (Big.shift_left p 1))
+            ((fun p -> Big.succ (Big.shift_left p 1)) Big.one))))))))
+       then ordered_rounding row' h' t
+              (ceil_to (Big.neg ((fun p -> Big.shift_left p 1)
+                ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+                ((fun p -> Big.shift_left p 1) ((fun p -> Big.shift_left p 1)
+                ((fun p -> Big.succ (Big.shift_left p 1))
+                ((fun p -> Big.shift_left p 1) Big.one))))))))
+                (add0 d (one_rounding m)))
+       else None)
+
+(** val widened : box -> dyadic list -> box **)
+
+let rec widened b r =
+  match b with
+  | [] -> []
+  | p :: b' ->
+    let (l, h) = p in
+    (match r with
+     | [] -> []
+     | a :: r' -> ((add0 l (neg a)), (add0 h a)) :: (widened b' r'))
+
+(** val layer_roundings :
+    bool -> matrixD -> dyadic list -> box -> dyadic list -> dyadic list option **)
+
+let rec layer_roundings in_order w c h m =
+  match w with
+  | [] -> (match c with
+           | [] -> Some []
+           | _ :: _ -> None)
+  | row :: w' ->
+    (match c with
+     | [] -> None
+     | a :: c' ->
+       let d =
+         if in_order
+         then ordered_rounding row h (a, a) zero
+         else any_rounding (Big.add ((fun p -> p) Big.one) (size0 row))
+                (add0 (abs a) (dot zero add0 mul0 (map abs row) m))
+       in
+       (match d with
+        | Some x ->
+          (match layer_roundings in_order w' c' h m with
+           | Some ds -> Some (x :: ds)
+           | None -> None)
+        | None -> None))
+
+(** val errors_fit :
+    matrixD -> dyadic list -> dyadic list -> dyadic list -> bool **)
+
+let rec errors_fit w r ds e =
+  match w with
+  | [] ->
+    (match ds with
+     | [] -> (match e with
+              | [] -> true
+              | _ :: _ -> false)
+     | _ :: _ -> false)
+  | row :: w' ->
+    (match ds with
+     | [] -> false
+     | d :: ds' ->
+       (match e with
+        | [] -> false
+        | x :: e' ->
+          (&&) (at_most (add0 (dot zero add0 mul0 (map abs row) r) d) x)
+            (errors_fit w' r ds' e')))
+
+(** val norm_fits : dyadic -> dyadic -> dyadic -> dyadic list -> bool **)
+
+let norm_fits n off x ds =
+  let d = add0 x (neg (mul0 n off)) in
+  (&&) (is_nonnegative d) (at_most (squareD ds) (mul0 d d))
+
+(** val check_roundings :
+    bool -> layerD list -> layerD -> box -> dyadic list -> box list -> dyadic
+    list list -> dyadic list -> dyadic list -> dyadic -> dyadic list ->
+    dyadic -> bool **)
+
+let rec check_roundings in_order hidden0 last0 b r bounds0 errors e norms0 off offs u =
+  let fits = fun l n x s ->
+    match layer_roundings in_order (fst l) (snd l) (widened b r) (sizes b r) with
+    | Some ds -> (&&) (errors_fit (fst l) r ds s) (norm_fits n off x ds)
+    | None -> false
+  in
+  (match hidden0 with
+   | [] ->
+     (match bounds0 with
+      | [] ->
+        (match errors with
+         | [] ->
+           (match norms0 with
+            | [] -> false
+            | n :: l ->
+              (match l with
+               | [] ->
+                 (match offs with
+                  | [] -> fits last0 n u e
+                  | _ :: _ -> false)
+               | _ :: _ -> false))
+         | _ :: _ -> false)
+      | _ :: _ -> false)
+   | l :: hidden' ->
+     (match bounds0 with
+      | [] -> false
+      | c :: bounds' ->
+        (match errors with
+         | [] -> false
+         | s :: errors' ->
+           (match norms0 with
+            | [] -> false
+            | n :: norms' ->
+              (match offs with
+               | [] -> false
+               | x :: offs' ->
+                 (&&) ((&&) (encloses (fst l) (snd l) b c) (fits l n x s))
+                   (check_roundings in_order hidden' last0 (map relu_ends c)
+                     s bounds' errors' e norms' x offs' u))))))
+
+(** val add_ends : Big.t -> Big.t -> box -> box -> box **)
+
+let rec add_ends low high v s =
+  match v with
+  | [] -> []
+  | p :: v' ->
+    let (l, h) = p in
+    (match s with
+     | [] -> []
+     | p0 :: s' ->
+       let (a, b) = p0 in
+       ((add0 (mul0 ((if is_nonnegative l then low else high), Big.zero) l) a),
+       (add0 (mul0 ((if is_nonnegative h then high else low), Big.zero) h) b)) :: 
+       (add_ends low high v' s'))
+
+(** val sum_fits :
+    Big.t -> dyadic list -> dyadic list -> dyadic list -> bool **)
+
+let rec sum_fits count0 m e errors =
+  match m with
+  | [] ->
+    (match e with
+     | [] -> (match errors with
+              | [] -> true
+              | _ :: _ -> false)
+     | _ :: _ -> false)
+  | a :: m' ->
+    (match e with
+     | [] -> false
+     | b :: e' ->
+       (match errors with
+        | [] -> false
+        | x :: errors' ->
+          (&&) (rounding_fits count0 a b x) (sum_fits count0 m' e' errors')))
 
 (** val in_words : Big.t list -> Big.t **)
 
@@ -3918,15 +4049,15 @@ let rec check_tree o ls inequality b around = function
        (check_tree o ls inequality (cut k m true b) lines upper)
    | None -> false)
 
-(** val widened : matrixD -> dyadic list -> matrixD **)
+(** val widened0 : matrixD -> dyadic list -> matrixD **)
 
-let rec widened w c =
+let rec widened0 w c =
   match w with
   | [] -> []
   | r :: w' ->
     (match c with
      | [] -> []
-     | a :: c' -> (app r (a :: [])) :: (widened w' c'))
+     | a :: c' -> (app r (a :: [])) :: (widened0 w' c'))
 
 (** val homogeneous : int -> layerD list -> layerD list **)
 
@@ -3935,7 +4066,7 @@ let rec homogeneous n = function
 | l :: ls' ->
   let (w, c) = l in
   let wide =
-    app (widened w c)
+    app (widened0 w c)
       (match ls' with
        | [] -> []
        | _ :: _ -> (unit_form n) :: [])
@@ -4135,7 +4266,7 @@ type proof =
 | By_layers of box list
 | By_sum of box
 | By_norm
-| By_roundings of box list * dyadic list list
+| By_roundings of box list * dyadic list list * dyadic * dyadic list * dyadic
 | By_rounded_sum of box * dyadic list
 | By_steps of box list
 | By_parts_among of dyadic * hints * (box * range_tree) list * tree
@@ -5059,18 +5190,20 @@ let rec find_within accepted p b =
      | _ -> find_within rest0 p b)
 
 (** val find_error :
-    claim list -> int -> box -> dyadic list -> (dyadic list * dyadic) option **)
+    bool -> claim list -> int -> box -> dyadic list -> (dyadic list * dyadic)
+    option **)
 
-let rec find_error accepted p b r =
+let rec find_error in_order accepted p b r =
   match accepted with
   | [] -> None
   | c0 :: rest0 ->
     (match c0 with
-     | Float_error (q, c, s, e, u) ->
-       if (&&) ((&&) ((=) p q) (same_box b c)) (same_numbers r s)
+     | Float_error (o, q, c, s, e, u) ->
+       if (&&) ((&&) ((&&) (eqb in_order o) ((=) p q)) (same_box b c))
+            (same_numbers r s)
        then Some (e, u)
-       else find_error rest0 p b r
-     | _ -> find_error rest0 p b r)
+       else find_error in_order rest0 p b r
+     | _ -> find_error in_order rest0 p b r)
 
 (** val find_alone : claim list -> int -> int -> dyadic option **)
 
@@ -5127,7 +5260,7 @@ let number_of number p terms =
 (** val times_in : int -> int list -> Big.t **)
 
 let times_in p those =
-  size (filter ((=) p) those)
+  size0 (filter ((=) p) those)
 
 (** val may_be_silent : int list list -> term list -> bool **)
 
@@ -5142,7 +5275,7 @@ let may_be_silent silent terms =
 
 let choices_of n t =
   filter (fun c ->
-    (&&) (Big.leq t.fewest (size c)) (Big.leq (size c) t.most))
+    (&&) (Big.leq t.fewest (size0 c)) (Big.leq (size0 c) t.most))
     (map (repeat t.phi) (seq 0 (Stdlib.Int.succ n)))
 
 (** val all_choices : int -> term list -> int list list **)
@@ -5156,7 +5289,7 @@ let rec all_choices n = function
 
 let always_silent silent terms =
   let longest = fold_right (fun c n -> Stdlib.max (length c) n) 0 silent in
-  if forallb (fun t -> Big.leq t.most (size (repeat 0 longest))) terms
+  if forallb (fun t -> Big.leq t.most (size0 (repeat 0 longest))) terms
   then forallb (is_silent silent) (all_choices longest terms)
   else false
 
@@ -5287,33 +5420,71 @@ let check_step ps accepted silent boxes p rho u sums0 =
        | None -> false))
     (check_all_among ps accepted boxes rho u (beside silent p) sums0)
 
-(** val check_error :
-    part list -> int -> box -> dyadic list -> dyadic list -> dyadic -> box
-    list -> dyadic list list -> bool **)
+(** val list_norms :
+    claim list -> int -> int -> layerD list -> dyadic list option **)
 
-let check_error ps p b r e u bounds0 errors =
+let rec list_norms accepted p layer = function
+| [] -> Some []
+| _ :: ls' ->
+  (match find_norm accepted p layer with
+   | Some u ->
+     (match list_norms accepted p (Stdlib.Int.succ layer) ls' with
+      | Some us -> if is_nonnegative u then Some (u :: us) else None
+      | None -> None)
+   | None -> None)
+
+(** val unclamped_slope : part list -> claim list -> int -> dyadic option **)
+
+let unclamped_slope ps accepted p =
   let q = part_at ps p in
-  (&&)
-    ((&&)
-      ((&&) (relu_between q)
-        (check_roundings q.hidden q.outer (clamp_ends q.clamp b) r bounds0
-          errors e)) (is_nonnegative u)) (at_most (squareD e) (mul0 u u))
+  (match if is_nil q.clamp then find_alone accepted p (inputs_of q) else None with
+   | Some k -> Some k
+   | None -> norm_of ps accepted p)
+
+(** val check_error :
+    part list -> claim list -> bool -> int -> box -> dyadic list -> dyadic
+    list -> dyadic -> box list -> dyadic list list -> dyadic -> dyadic list
+    -> dyadic -> bool **)
+
+let check_error ps accepted in_order p b r e u bounds0 errors moved0 offs made =
+  let q = part_at ps p in
+  (&&) ((&&) (relu_between q) (fits_part q))
+    (match list_norms accepted p 0 (layers q) with
+     | Some ns ->
+       (match unclamped_slope ps accepted p with
+        | Some k ->
+          (&&)
+            ((&&)
+              ((&&)
+                ((&&)
+                  ((&&)
+                    ((&&)
+                      (check_roundings in_order q.hidden q.outer
+                        (clamp_ends q.clamp b) r bounds0 errors e ns zero
+                        offs made) (is_nonnegative u)) (is_nonnegative k))
+                  (is_nonnegative moved0))
+                (at_most (squareD r) (mul0 moved0 moved0)))
+              ((=) (length r) (inputs_of q)))
+            ((||) (at_most (squareD e) (mul0 u u))
+              (at_most (add0 (mul0 k moved0) made) u))
+        | None -> false)
+     | None -> false)
 
 (** val sum_errors :
-    claim list -> int -> (term * dyadic list) list -> ((Big.t * dyadic
-    list) * dyadic list) option **)
+    bool -> claim list -> int -> (term * dyadic list) list ->
+    ((Big.t * dyadic list) * dyadic list) option **)
 
-let rec sum_errors accepted n = function
+let rec sum_errors in_order accepted n = function
 | [] -> Some ((((fun p -> p) Big.one), (repeat zero n)), (repeat zero n))
 | p0 :: terms' ->
   let (t, r) = p0 in
   let { phi = p; inputs_in = b; fewest = _; most = high } = t in
   (match find_within accepted p b with
    | Some v ->
-     (match find_error accepted p b r with
+     (match find_error in_order accepted p b r with
       | Some p1 ->
         let (e, _) = p1 in
-        (match sum_errors accepted n terms' with
+        (match sum_errors in_order accepted n terms' with
          | Some p2 ->
            let (p3, s) = p2 in
            let (count0, m) = p3 in
@@ -5329,18 +5500,18 @@ let rec sum_errors accepted n = function
    | None -> None)
 
 (** val check_sum_error :
-    part list -> claim list -> (term * dyadic list) list -> int -> dyadic ->
-    box -> dyadic list -> bool **)
+    part list -> claim list -> bool -> (term * dyadic list) list -> int ->
+    dyadic -> box -> dyadic list -> bool **)
 
-let check_sum_error ps accepted terms rho u sums0 errors =
+let check_sum_error ps accepted in_order terms rho u sums0 errors =
   let n = inputs_of (part_at ps rho) in
   (match sum_ends accepted n (map fst terms) with
    | Some s ->
-     (match sum_errors accepted n terms with
+     (match sum_errors in_order accepted n terms with
       | Some p ->
         let (p0, e) = p in
         let (count0, m) = p0 in
-        (match find_error accepted rho sums0 errors with
+        (match find_error in_order accepted rho sums0 errors with
          | Some p1 ->
            let (_, w) = p1 in
            (&&)
@@ -5407,15 +5578,16 @@ let check_claim ps accepted c p =
     (match p with
      | By_norm -> check_jump ps accepted p0 b rho u
      | _ -> false)
-  | Float_error (p0, b, r, e, u) ->
+  | Float_error (in_order, p0, b, r, e, u) ->
     (match p with
-     | By_roundings (bounds0, errors) ->
-       check_error ps p0 b r e u bounds0 errors
+     | By_roundings (bounds0, errors, moved0, offs, made) ->
+       check_error ps accepted in_order p0 b r e u bounds0 errors moved0 offs
+         made
      | _ -> false)
-  | Sum_float_error (terms, rho, u) ->
+  | Sum_float_error (in_order, terms, rho, u) ->
     (match p with
      | By_rounded_sum (sums0, errors) ->
-       check_sum_error ps accepted terms rho u sums0 errors
+       check_sum_error ps accepted in_order terms rho u sums0 errors
      | _ -> false)
   | Slope_among (p0, rho, moves, scale0, b, others, u) ->
     (match p with

@@ -57,6 +57,8 @@ module Pos :
 
   val div2_up : Big.t -> Big.t
 
+  val size : Big.t -> Big.t
+
   val compare_cont : comparison -> Big.t -> Big.t -> comparison
 
   val compare : Big.t -> Big.t -> comparison
@@ -394,8 +396,8 @@ type claim =
 | Within of int * box * box
 | Sum_within of int list list * term list * int * box
 | Jump_at_most of int * box * int * dyadic
-| Float_error of int * box * dyadic list * dyadic list * dyadic
-| Sum_float_error of (term * dyadic list) list * int * dyadic
+| Float_error of bool * int * box * dyadic list * dyadic list * dyadic
+| Sum_float_error of bool * (term * dyadic list) list * int * dyadic
 | Slope_among of int * int * bool list * dyadic list * box * term list
    * dyadic
 | Law_among of bool * ((kind * box) * Big.t) list * int * dyadic
@@ -439,51 +441,6 @@ val reluD : dyadic -> dyadic
 val minusD : dyadic list -> dyadic list -> dyadic list
 
 val squareD : dyadic list -> dyadic
-
-val at_most : dyadic -> dyadic -> bool
-
-val clampedD : (dyadic * dyadic) list -> dyadic list -> dyadic list
-
-val same : dyadic -> dyadic -> bool
-
-val same_numbers : dyadic list -> dyadic list -> bool
-
-val same_box : box -> box -> bool
-
-val contains : box -> box -> bool
-
-val clamp_ends : (dyadic * dyadic) list -> box -> box
-
-val relu_ends : (dyadic * dyadic) -> dyadic * dyadic
-
-val larger : dyadic -> dyadic -> dyadic
-
-val largest_abs : (dyadic * dyadic) -> dyadic
-
-val row_ends : dyadic list -> box -> dyadic * dyadic
-
-val encloses : matrixD -> dyadic list -> box -> box -> bool
-
-val check_layers : layerD list -> layerD -> box -> box list -> box -> bool
-
-val sizes : box -> dyadic list -> dyadic list
-
-val size : 'a1 list -> Big.t
-
-val gammaD : Big.t -> dyadic
-
-val rounding_fits : Big.t -> dyadic -> dyadic -> dyadic -> bool
-
-val layer_fits :
-  matrixD -> dyadic list -> dyadic list -> dyadic list -> dyadic list -> bool
-
-val check_roundings :
-  layerD list -> layerD -> box -> dyadic list -> box list -> dyadic list list
-  -> dyadic list -> bool
-
-val add_ends : Big.t -> Big.t -> box -> box -> box
-
-val sum_fits : Big.t -> dyadic list -> dyadic list -> dyadic list -> bool
 
 type fixed = Big.t * Big.t
 
@@ -530,6 +487,65 @@ val vanishing : Big.t
 val exp_by_series : fixed -> fixed
 
 val exp_of_minus : fixed -> fixed
+
+val at_most : dyadic -> dyadic -> bool
+
+val clampedD : (dyadic * dyadic) list -> dyadic list -> dyadic list
+
+val same : dyadic -> dyadic -> bool
+
+val same_numbers : dyadic list -> dyadic list -> bool
+
+val same_box : box -> box -> bool
+
+val contains : box -> box -> bool
+
+val clamp_ends : (dyadic * dyadic) list -> box -> box
+
+val relu_ends : (dyadic * dyadic) -> dyadic * dyadic
+
+val larger : dyadic -> dyadic -> dyadic
+
+val largest_abs : (dyadic * dyadic) -> dyadic
+
+val row_ends : dyadic list -> box -> dyadic * dyadic
+
+val encloses : matrixD -> dyadic list -> box -> box -> bool
+
+val check_layers : layerD list -> layerD -> box -> box list -> box -> bool
+
+val sizes : box -> dyadic list -> dyadic list
+
+val size0 : 'a1 list -> Big.t
+
+val gammaD : Big.t -> dyadic
+
+val any_rounding : Big.t -> dyadic -> dyadic option
+
+val rounding_fits : Big.t -> dyadic -> dyadic -> dyadic -> bool
+
+val one_rounding : dyadic -> dyadic
+
+val ordered_rounding :
+  dyadic list -> box -> (dyadic * dyadic) -> dyadic -> dyadic option
+
+val widened : box -> dyadic list -> box
+
+val layer_roundings :
+  bool -> matrixD -> dyadic list -> box -> dyadic list -> dyadic list option
+
+val errors_fit : matrixD -> dyadic list -> dyadic list -> dyadic list -> bool
+
+val norm_fits : dyadic -> dyadic -> dyadic -> dyadic list -> bool
+
+val check_roundings :
+  bool -> layerD list -> layerD -> box -> dyadic list -> box list -> dyadic
+  list list -> dyadic list -> dyadic list -> dyadic -> dyadic list -> dyadic
+  -> bool
+
+val add_ends : Big.t -> Big.t -> box -> box -> box
+
+val sum_fits : Big.t -> dyadic list -> dyadic list -> dyadic list -> bool
 
 val in_words : Big.t list -> Big.t
 
@@ -787,7 +803,7 @@ val check_tree :
   hints -> layerD list -> (line list list -> conflict list -> dyadic list ->
   matrixD) -> box -> line list list -> tree -> bool
 
-val widened : matrixD -> dyadic list -> matrixD
+val widened0 : matrixD -> dyadic list -> matrixD
 
 val homogeneous : int -> layerD list -> layerD list
 
@@ -848,7 +864,7 @@ type proof =
 | By_layers of box list
 | By_sum of box
 | By_norm
-| By_roundings of box list * dyadic list list
+| By_roundings of box list * dyadic list list * dyadic * dyadic list * dyadic
 | By_rounded_sum of box * dyadic list
 | By_steps of box list
 | By_parts_among of dyadic * hints * (box * range_tree) list * tree
@@ -1056,7 +1072,8 @@ val check_halves :
 val find_within : claim list -> int -> box -> box option
 
 val find_error :
-  claim list -> int -> box -> dyadic list -> (dyadic list * dyadic) option
+  bool -> claim list -> int -> box -> dyadic list -> (dyadic list * dyadic)
+  option
 
 val find_alone : claim list -> int -> int -> dyadic option
 
@@ -1103,17 +1120,22 @@ val check_step :
   part list -> claim list -> int list list -> (int * box) list -> int -> int
   -> dyadic -> box list -> bool
 
+val list_norms : claim list -> int -> int -> layerD list -> dyadic list option
+
+val unclamped_slope : part list -> claim list -> int -> dyadic option
+
 val check_error :
-  part list -> int -> box -> dyadic list -> dyadic list -> dyadic -> box list
-  -> dyadic list list -> bool
+  part list -> claim list -> bool -> int -> box -> dyadic list -> dyadic list
+  -> dyadic -> box list -> dyadic list list -> dyadic -> dyadic list ->
+  dyadic -> bool
 
 val sum_errors :
-  claim list -> int -> (term * dyadic list) list -> ((Big.t * dyadic
+  bool -> claim list -> int -> (term * dyadic list) list -> ((Big.t * dyadic
   list) * dyadic list) option
 
 val check_sum_error :
-  part list -> claim list -> (term * dyadic list) list -> int -> dyadic ->
-  box -> dyadic list -> bool
+  part list -> claim list -> bool -> (term * dyadic list) list -> int ->
+  dyadic -> box -> dyadic list -> bool
 
 val check_claim : part list -> claim list -> claim -> proof -> bool
 

@@ -54,10 +54,10 @@ let claim out = function
       natural rho number u
   | Jump_at_most (phi, b, rho, u) ->
     Printf.bprintf out "Jump_at_most %a %a %a %a" natural phi box b natural rho number u
-  | Float_error (p, b, r, e, u) ->
-    Printf.bprintf out "Float_error %a %a %a %a %a" natural p box b numbers r numbers e number u
-  | Sum_float_error (terms, rho, u) ->
-    Printf.bprintf out "Sum_float_error %a %a %a" (list (pair term numbers)) terms natural rho number u
+  | Float_error (in_order, p, b, r, e, u) ->
+    Printf.bprintf out "Float_error %a %a %a %a %a %a" flag in_order natural p box b numbers r numbers e number u
+  | Sum_float_error (in_order, terms, rho, u) ->
+    Printf.bprintf out "Sum_float_error %a %a %a %a" flag in_order (list (pair term numbers)) terms natural rho number u
 let proof out = function
   | Proved.By_inequality (rho, t, { unit0; scales; rows }) ->
     Printf.bprintf out "By_inequality %a %a (Factor (%a) %a %a)" number rho long_numbers t integer unit0
@@ -72,7 +72,9 @@ let proof out = function
   | By_layers bounds -> Printf.bprintf out "By_layers %a" (list box) bounds
   | By_sum sums -> Printf.bprintf out "By_sum %a" box sums
   | By_norm -> Buffer.add_string out "By_norm"
-  | By_roundings (bounds, errors) -> Printf.bprintf out "By_roundings %a %a" (list box) bounds (list numbers) errors
+  | By_roundings (bounds, errors, moved, offs, made) ->
+    Printf.bprintf out "By_roundings %a %a %a %a %a" (list box) bounds (list numbers) errors number moved numbers offs
+      number made
   | By_steps sums -> Printf.bprintf out "By_steps %a" (list box) sums
   | By_rounded_sum (sums, errors) -> Printf.bprintf out "By_rounded_sum %a %a" box sums numbers errors
 

@@ -26,7 +26,8 @@ let common =
    |df| <= jump where one more neighbour comes or goes, whatever the others are, in exact arithmetic; and \
    |g - f| <= float32_error for each g that float32 arithmetic may give, whose inputs after the clamp are \
    off by at most input_error: sums of products in any order, fused or not, each operation rounded to \
-   nearest."
+   nearest; at most float32_error_in_order where those of each layer start with the bias and add the products \
+   from the first input to the last, each rounded or fused."
 
 (* What is added for networks with a layer that is sorted. *)
 let sorting =

@@ -9,14 +9,19 @@ let texts where ~size json =
   require (List.length values = size) "%s: needs one number per output" where;
   values
 
-(* What is stated of a layer or a sum: intervals, and errors ([] where nothing is said of float32). *)
+(* What is stated of a layer or a sum: intervals, and errors by whether sums are in order ([] where nothing is said of
+   float32). *)
 let stated where ~size ~with_error json =
-  require_keys where [ "lower"; "upper"; "error" ] json;
-  let error = find where "error" json in
-  require ((error <> Null) = with_error) "%s: an error must be given if there are input errors, and only then" where;
+  require_keys where [ "lower"; "upper"; "error"; "error_in_order" ] json;
   let lower = texts where ~size (find where "lower" json) in
   let upper = texts where ~size (find where "upper" json) in
-  List.combine lower upper, if with_error then texts where ~size error else []
+  let error key =
+    let error = find where key json in
+    require ((error <> Null) = with_error) "%s: an error must be given if there are input errors, and only then" where;
+    if with_error then texts where ~size error else [] in
+  let in_any = error "error" in
+  let in_order = error "error_in_order" in
+  List.combine lower upper, fun ordered -> if ordered then in_order else in_any
 
 (* The layers of a network in order; the last one by itself. *)
 let layers where (weights : Weights.t) ~with_error json =
@@ -29,12 +34,46 @@ let layers where (weights : Weights.t) ~with_error json =
 let leaves where = where ^ ": the values leave the bounds"
 let too_little where = where ^ ": claims less than the float32 error"
 
-(* Of a network for inputs in `box`, computed with errors of at most `errors`, entry by entry; `norm`: of its error. *)
+(* At least the square root, on the grid of swarmcert check. *)
+let root_above x =
+  let units, exponent = Proved.ceil_to (Z.of_int (-320)) x in
+  let shift = Z.to_int exponent + 320 in
+  Z.succ (Z.sqrt (Z.shift_left units shift)), Z.of_int (-160)
+
+(* The norms of what the layers add to the errors of their inputs. *)
+let added (state : Claims.t) where p ~in_order ~box ~errors bounds stated_errors =
+  let part = Proved.part_at state.parts p in
+  let layers = Proved.layers part in
+  let norms = match Proved.list_norms state.accepted p 0 layers with
+    | Some norms -> norms | None -> rejected "%s: norms are missing" where in
+  let rec go off box errors layers norms bounds stated_errors = match layers, norms with
+    | (w, biases) :: layers, norm :: norms ->
+      let rounding = Proved.layer_roundings in_order w biases (Proved.widened box errors) (Proved.sizes box errors) in
+      (match rounding with
+       | None -> rejected "%s" (too_little where)
+       | Some made ->
+         let off = Claims.plus (Claims.times norm off) (root_above (Proved.squareD made)) in
+         off :: (match bounds, stated_errors with
+             | b :: bounds, e :: stated_errors ->
+               go off (List.map Proved.relu_ends b) e layers norms bounds stated_errors
+             | _ -> []))
+    | _ -> [] in
+  go Exact.zero (Proved.clamp_ends part.clamp box) errors layers norms bounds stated_errors
+
+(* Of a network for inputs in `box`, computed with errors of at most `errors`, entry by entry. `norm`: of its error, by
+   whether the sums are in order. *)
 let prove_network (state : Claims.t) where p ~box ~errors ~with_error ~norm (hidden, (last, last_error)) =
-  Claims.prove state (Within (p, box, last)) (By_layers (List.map fst hidden)) (leaves where);
-  if with_error then
-    Claims.prove state (Float_error (p, box, errors, last_error, norm))
-      (By_roundings (List.map fst hidden, List.map snd hidden)) (too_little where)
+  let bounds = List.map fst hidden in
+  Claims.prove state (Within (p, box, last)) (By_layers bounds) (leaves where);
+  let prove in_order =
+    let errors = errors in_order and stated_errors = List.map (fun (_, error) -> error in_order) hidden in
+    match List.rev (added state where p ~in_order ~box ~errors bounds stated_errors) with
+    | made :: offs ->
+      Claims.prove state (Float_error (in_order, p, box, errors, last_error in_order, norm in_order))
+        (By_roundings (bounds, stated_errors, root_above (Proved.squareD errors), List.rev offs, made))
+        (too_little where)
+    | [] -> assert false in
+  if with_error then List.iter prove [ false; true ]
 
 (* At least the norm of these numbers. *)
 let sum_of numbers = List.fold_left Claims.plus Exact.zero numbers
@@ -49,12 +88,13 @@ let input_box (state : Claims.t) where name entry =
 let input (state : Claims.t) where name entry =
   let box = input_box state where name entry in
   match find where "input_error" entry with
-  | Null -> box, []
+  | Null -> box, fun _ -> []
   | all ->
     let errors = Exact.hex_floats where (find where name all) in
     require (List.length errors = List.length box && List.for_all (fun e -> e >= 0.) errors)
       "%s: needs one input error per input, none negative" where;
-    box, List.map Exact.of_float errors
+    let errors = List.map Exact.of_float errors in
+    box, fun _ -> errors
 
 let optional where entry key ~given =
   let decimal = find where key entry and hex = find where (key ^ "_hex") entry in
@@ -63,7 +103,7 @@ let optional where entry key ~given =
   if given then Some (Exact.of_float (Exact.number (where ^ " " ^ key) decimal hex)) else None
 
 let keys = [ "function"; "neighbours"; "domain"; "input_error"; "networks"; "sum"; "lower"; "upper"; "jump"; "jump_hex";
-             "float32_error"; "float32_error_hex" ]
+             "float32_error"; "float32_error_hex"; "float32_error_in_order"; "float32_error_in_order_hex" ]
 
 (* Of the largest absolute values. *)
 let sum_of_squares values =
@@ -145,7 +185,10 @@ let check (state : Claims.t) entry =
   require (List.length lower = outputs && List.length upper = outputs) "%s: the values leave the range" where;
   let range = List.combine lower upper in
   let jump = optional where entry "jump" ~given:is_set in
-  let norm = Option.value ~default:Exact.zero (optional where entry "float32_error" ~given:with_error) in
+  let norm_of key = Option.value ~default:Exact.zero (optional where entry key ~given:with_error) in
+  let in_any = norm_of "float32_error" in
+  let in_order = norm_of "float32_error_in_order" in
+  let norm ordered = if ordered then in_order else in_any in
   let sum = find where "sum" entry in
   require ((sum <> Null) = is_set) "%s: a sum must be given for set functions, and only for them" where;
   (match rho with
@@ -163,7 +206,8 @@ let check (state : Claims.t) entry =
        let p = Functions.index state.net name in
        let box, errors = input state where name entry in
        let hidden, (last, last_error) = bounds name in
-       prove_network state (where ^ ": " ^ name) p ~box ~errors ~with_error ~norm:(sum_of last_error)
+       prove_network state (where ^ ": " ^ name) p ~box ~errors ~with_error
+         ~norm:(fun ordered -> sum_of (last_error ordered))
          (hidden, (last, last_error));
        let fewest, most = if name = "phi:ground" then 1, 1 else 0, count in
        { Proved.phi = p; inputs_in = box; fewest = Z.of_int fewest; most = Z.of_int most }, errors, last in
@@ -183,7 +227,9 @@ let check (state : Claims.t) entry =
      let jump = Option.get jump in
      check_jump state where first.phi ~box:first.inputs_in ~values rho jump;
      if silent <> [] then check_step state where entry ~silent first.phi r jump;
-     if with_error then
-       Claims.prove state (Sum_float_error (List.map (fun (t, errors, _) -> t, errors) terms, r, norm))
-         (Proved.By_rounded_sum (sums, sum_errors)) (too_little where));
+     let prove_sum in_order =
+       let terms = List.map (fun (t, errors, _) -> t, errors in_order) terms in
+       Claims.prove state (Sum_float_error (in_order, terms, r, norm in_order))
+         (Proved.By_rounded_sum (sums, sum_errors in_order)) (too_little where) in
+     if with_error then List.iter prove_sum [ false; true ]);
   state.values <- state.values + 1

@@ -17,7 +17,7 @@ Inductive proof :=
 | By_layers (bounds : list box)
 | By_sum (sums : box)
 | By_norm
-| By_roundings (bounds : list box) (errors : list (list dyadic))
+| By_roundings (bounds : list box) (errors : list (list dyadic)) (moved : dyadic) (offs : list dyadic) (made : dyadic)
 | By_rounded_sum (sums : box) (errors : list dyadic)
 | By_steps (sums : list box)
 | By_parts_among (rho : dyadic) (o : hints) (ranges : list (box * range_tree)) (t : tree)
@@ -446,12 +446,14 @@ Fixpoint find_within (accepted : list claim) (p : nat) (b : box) : option box :=
   | Within q c v :: rest => if (p =? q)%nat && same_box b c then Some v else find_within rest p b
   | _ :: rest => find_within rest p b
   end.
-Fixpoint find_error (accepted : list claim) (p : nat) (b : box) (r : list dyadic) : option (list dyadic * dyadic) :=
+Fixpoint find_error (in_order : bool) (accepted : list claim) (p : nat) (b : box) (r : list dyadic)
+    : option (list dyadic * dyadic) :=
   match accepted with
   | [] => None
-  | Float_error q c s e u :: rest =>
-      if (p =? q)%nat && same_box b c && same_numbers r s then Some (e, u) else find_error rest p b r
-  | _ :: rest => find_error rest p b r
+  | Float_error o q c s e u :: rest =>
+      if eqb in_order o && (p =? q)%nat && same_box b c && same_numbers r s then Some (e, u)
+      else find_error in_order rest p b r
+  | _ :: rest => find_error in_order rest p b r
   end.
 (** A bound of a part by itself, for any change of its inputs. *)
 Fixpoint find_alone (accepted : list claim) (p n : nat) : option dyadic :=
@@ -560,17 +562,42 @@ Definition check_step ps accepted silent boxes p rho u sums : bool :=
      | None => false
      end
   && check_all_among ps accepted boxes rho u (beside silent p) sums.
-Definition check_error ps p b r e u bounds errors : bool :=
+(** The norm of each layer. *)
+Fixpoint list_norms (accepted : list claim) (p layer : nat) (ls : list layerD) : option (list dyadic) :=
+  match ls with
+  | [] => Some []
+  | _ :: ls' =>
+      match find_norm accepted p layer, list_norms accepted p (S layer) ls' with
+      | Some u, Some us => if is_nonnegative u then Some (u :: us) else None
+      | _, _ => None
+      end
+  end.
+(** A bound of what follows the clamp. *)
+Definition unclamped_slope ps (accepted : list claim) (p : nat) : option dyadic :=
   let q := part_at ps p in
-  relu_between q && check_roundings (hidden q) (outer q) (clamp_ends (clamp q) b) r bounds errors e
-  && is_nonnegative u && at_most (squareD e) (mul u u).
+  match (if is_nil (clamp q) then find_alone accepted p (inputs_of q) else None) with
+  | Some k => Some k
+  | None => norm_of ps accepted p
+  end.
+(** What the errors r of the inputs come to, at most `moved` in norm, and what the layers add, at most `made`. *)
+Definition check_error ps accepted in_order p b r e u bounds errors moved offs made : bool :=
+  let q := part_at ps p in
+  relu_between q && fits_part q
+  && match list_norms accepted p O (layers q), unclamped_slope ps accepted p with
+     | Some ns, Some k =>
+         check_roundings in_order (hidden q) (outer q) (clamp_ends (clamp q) b) r bounds errors e ns zero offs made
+         && is_nonnegative u && is_nonnegative k && is_nonnegative moved && at_most (squareD r) (mul moved moved)
+         && (length r =? inputs_of q)%nat
+         && (at_most (squareD e) (mul u u) || at_most (add (mul k moved) made) u)
+     | _, _ => false
+     end.
 (** How many summands at most, the sum of their sizes and that of their errors. *)
-Fixpoint sum_errors (accepted : list claim) (n : nat) (terms : list (term * list dyadic)) :
+Fixpoint sum_errors (in_order : bool) (accepted : list claim) (n : nat) (terms : list (term * list dyadic)) :
     option (Z * list dyadic * list dyadic) :=
   match terms with
   | [] => Some (1%Z, repeat zero n, repeat zero n)
   | (Term p b low high, r) :: terms' =>
-      match find_within accepted p b, find_error accepted p b r, sum_errors accepted n terms' with
+      match find_within accepted p b, find_error in_order accepted p b r, sum_errors in_order accepted n terms' with
       | Some v, Some (e, _), Some (count, m, s) =>
           if ((length v =? n)%nat && (length e =? n)%nat && (0 <=? high)%Z && forallb is_nonnegative e)%bool then
             Some ((high + count)%Z, plus add (scale mul (high, 0%Z) (sizes v e)) m, plus add (scale mul (high,
@@ -579,9 +606,10 @@ Fixpoint sum_errors (accepted : list claim) (n : nat) (terms : list (term * list
       | _, _, _ => None
       end
   end.
-Definition check_sum_error ps accepted terms rho u sums errors : bool :=
+Definition check_sum_error ps accepted in_order terms rho u sums errors : bool :=
   let n := inputs_of (part_at ps rho) in
-  match sum_ends accepted n (map fst terms), sum_errors accepted n terms, find_error accepted rho sums errors with
+  match sum_ends accepted n (map fst terms), sum_errors in_order accepted n terms,
+    find_error in_order accepted rho sums errors with
   | Some s, Some (count, m, e), Some (_, w) =>
       contains sums s && is_nil (clamp (part_at ps rho)) && (length errors =? n)%nat
       && sum_fits count m e errors && at_most w u
@@ -606,8 +634,10 @@ Definition check_claim (ps : list part) (accepted : list claim) (c : claim) (p :
   | Within p b v, By_layers bounds => check_within ps p b bounds v
   | Sum_within silent terms rho v, By_sum sums => check_sum_within ps accepted silent terms rho v sums
   | Jump_at_most p b rho u, By_norm => check_jump ps accepted p b rho u
-  | Float_error p b r e u, By_roundings bounds errors => check_error ps p b r e u bounds errors
-  | Sum_float_error terms rho u, By_rounded_sum sums errors => check_sum_error ps accepted terms rho u sums errors
+  | Float_error in_order p b r e u, By_roundings bounds errors moved offs made =>
+      check_error ps accepted in_order p b r e u bounds errors moved offs made
+  | Sum_float_error in_order terms rho u, By_rounded_sum sums errors =>
+      check_sum_error ps accepted in_order terms rho u sums errors
   | Slope_among p rho moves scale b others u, By_parts_among r o ranges t =>
       check_slope_among ps p rho moves scale b others u r o ranges t
   | Law_among stacked kinds rho u, By_triangle => check_law_among ps accepted stacked kinds rho u

@@ -13,6 +13,8 @@ Extract Inlined Constant Z.abs => "Big.abs".
 Extract Inlined Constant Z.eqb => "Big.equal".
 Extract Inlined Constant Z.leb => "Big.leq".
 Extract Inlined Constant Z.ltb => "Big.lt".
+(* Called with positive numbers. *)
+Extract Inlined Constant Z.log2 => "(fun a -> Big.of_int (Big.log2 a))".
 (* Called with distances that are not negative, and Z.div with a positive divisor. Big.to_int raises if a distance is
    huge, Big.shift_left and Big.shift_right if it is negative, Big.fdiv if the divisor is 0; all round down. *)
 Extract Inlined Constant Z.div => "Big.fdiv".

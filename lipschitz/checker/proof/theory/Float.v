@@ -20,12 +20,25 @@ Inductive float_sum : list R -> R -> Prop :=
 | fused s l a v : float_sum l a -> rounds (s + a) v -> float_sum (s :: l) v
 | added l k a b v : float_sum l a -> float_sum k b -> rounds (a + b) v -> float_sum (l ++ k) v
 | reordered l k v : Permutation l k -> float_sum l v -> float_sum k v.
-Definition float_layer (l : matrix * list R) (h v : list R) : Prop :=
-  Forall2 (fun row_bias y => float_sum (snd row_bias :: timesR (fst row_bias) h) y) (combine (fst l) (snd l)) v.
-Fixpoint float_network (hidden : list (matrix * list R)) (last : matrix * list R) (h v : list R) : Prop :=
+(** The same, with half the distance between floats below a power of two. *)
+Definition rounds_closely (exact v : R) : Prop := rounds exact v /\
+  forall k, (k <= 127)%Z -> Rabs exact <= powerRZ 2 k -> Rabs (v - exact) <= powerRZ 2 (k - 25) + tiny.
+(** v is what becomes of a where the summands are added to it one after the other, each rounded by itself or fused. *)
+Inductive added_in_order : R -> list R -> R -> Prop :=
+| none_left a : added_in_order a [] a
+| rounded_next a s l p b v : rounds_closely s p -> rounds_closely (a + p) b -> added_in_order b l v ->
+    added_in_order a (s :: l) v
+| fused_next a s l b v : rounds_closely (s + a) b -> added_in_order b l v -> added_in_order a (s :: l) v.
+(** `in_order`: each sum starts with the bias, and the products follow from the first input to the last. *)
+Definition float_layer (in_order : bool) (l : matrix * list R) (h v : list R) : Prop :=
+  Forall2 (fun row_bias y => let products := timesR (fst row_bias) h in
+    if in_order then added_in_order (snd row_bias) products y else float_sum (snd row_bias :: products) y)
+    (combine (fst l) (snd l)) v.
+Fixpoint float_network (in_order : bool) (hidden : list (matrix * list R)) (last : matrix * list R) (h v : list R)
+    : Prop :=
   match hidden with
-  | [] => float_layer last h v
-  | l :: hidden' => exists y, float_layer l h y /\ float_network hidden' last (map relu y) v
+  | [] => float_layer in_order last h v
+  | l :: hidden' => exists y, float_layer in_order l h y /\ float_network in_order hidden' last (map relu y) v
   end.
 
 Definition total (l : list R) : R := fold_right Rplus 0 l.

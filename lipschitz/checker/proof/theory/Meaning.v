@@ -119,12 +119,11 @@ Fixpoint box_of (boxes : list (nat * box)) (p : nat) : option box :=
   match boxes with [] => None | (q, b) :: boxes' => if (p =? q)%nat then Some b else box_of boxes' p end.
 Definition in_its_box (boxes : list (nat * box)) (t : single) : Prop :=
   match box_of boxes (fst t) with Some b => within b (snd t) | None => False end.
-(** v is what the float32 evaluation of part p returns for inputs x,
-  if what reaches its first layer differs from the clamped x
-    by at most r, number by number. *)
-Definition evaluates (p : part) (r : list dyadic) (x v : list R) : Prop :=
+(** v is what the float32 evaluation of part p returns for inputs x, if what reaches its first layer differs from the
+    clamped x by at most r, number by number; `in_order`: with the sums of the layers in order. *)
+Definition evaluates (in_order : bool) (p : part) (r : list dyadic) (x v : list R) : Prop :=
   exists h, close r (clamped (clamp p) x) h /\
-    float_network (map real_layer (hidden p)) (real_layer (outer p)) h v.
+    float_network in_order (map real_layer (hidden p)) (real_layer (outer p)) h v.
 (** Number by number a float32 sum of these vectors, starting from zero. *)
 Definition float_vector_sum (n : nat) (us : list (list R)) (s : list R) : Prop :=
   length s = n /\ forall i, (i < n)%nat -> float_sum (0 :: map (fun u => nth i u 0) us) (nth i s 0).
@@ -140,8 +139,8 @@ Inductive claim :=
 | Within (p : nat) (b v : box)
 | Sum_within (silent : list (list nat)) (terms : list term) (rho : nat) (v : box)
 | Jump_at_most (phi : nat) (b : box) (rho : nat) (u : dyadic)
-| Float_error (p : nat) (b : box) (r e : list dyadic) (u : dyadic)
-| Sum_float_error (terms : list (term * list dyadic)) (rho : nat) (u : dyadic)
+| Float_error (in_order : bool) (p : nat) (b : box) (r e : list dyadic) (u : dyadic)
+| Sum_float_error (in_order : bool) (terms : list (term * list dyadic)) (rho : nat) (u : dyadic)
 | Slope_among (phi rho : nat) (moves : list bool) (scale : list dyadic) (b : box) (others : list term) (u : dyadic)
 | Law_among (stacked : bool) (kinds : list (kind * box * Z)) (rho : nat) (u : dyadic)
 | Step_at_most (silent : list (list nat)) (boxes : list (nat * box)) (phi rho : nat) (u : dyadic).
@@ -188,18 +187,18 @@ Definition holds (ps : list part) (c : claim) : Prop :=
       forall x rest, within b x -> length rest = inputs_of (part_at ps rho) ->
         norm (minus (value (part_at ps rho) (plusR (value (part_at ps phi) x) rest)) (value (part_at ps rho) rest))
           <= real u
-  | Float_error p b r e u =>
+  | Float_error in_order p b r e u =>
       all_relu (part_at ps p) /\
-      forall x v, within b x -> evaluates (part_at ps p) r x v ->
+      forall x v, within b x -> evaluates in_order (part_at ps p) r x v ->
         close e (value (part_at ps p) x) v /\ norm (minus v (value (part_at ps p) x)) <= real u
-  | Sum_float_error terms rho u =>
+  | Sum_float_error in_order terms rho u =>
       all_relu (part_at ps rho) /\ Forall (fun t => all_relu (part_at ps (phi (fst t)))) terms /\
       forall inputs computed s v, Forall2 may_stand (map fst terms) inputs ->
-        Forall2 (fun t_xs vs => Forall2 (evaluates (part_at ps (phi (fst (fst t_xs)))) (snd (fst t_xs))) (snd t_xs)
-          vs)
+        Forall2 (fun t_xs vs =>
+          Forall2 (evaluates in_order (part_at ps (phi (fst (fst t_xs)))) (snd (fst t_xs))) (snd t_xs) vs)
           (combine terms inputs) computed ->
         float_vector_sum (inputs_of (part_at ps rho)) (concat computed) s ->
-        float_network (map real_layer (hidden (part_at ps rho))) (real_layer (outer (part_at ps rho))) s v ->
+        float_network in_order (map real_layer (hidden (part_at ps rho))) (real_layer (outer (part_at ps rho))) s v ->
         norm (minus v (value (part_at ps rho) (sum_of_terms ps rho (combine (map fst terms) inputs)))) <= real u
   | Slope_among p rho moves scale b others u =>
       forall inputs x y, Forall2 may_stand others inputs -> agree moves x y -> length x = inputs_of (part_at ps p) ->

@@ -1,4 +1,4 @@
-#include "lipschitz/values/float32_search.h"
+#include "lipschitz/float32_search.h"
 
 #include <algorithm>
 #include <cmath>
