@@ -1,33 +1,23 @@
 #include "analysis/identification/explanation.h"
 
 #include <algorithm>
-#include <cmath>
-#include <cstdio>
-#include <cstdlib>
-#include <map>
 #include <optional>
 #include <set>
 
-#include "analysis/identification/closed_loop.h"
-#include "analysis/identification/doubts.h"
 #include "analysis/identification/evidence/explanations.h"
 #include "analysis/identification/scan/drag_law.h"
 #include "analysis/identification/scan/named_forms.h"
 #include "analysis/identification/swinging_load.h"
-#include "analysis/identification/thrust_doubts.h"
-#include "nn/base/doubles.h"
 #include "stability/effects/registry.h"
 
 namespace swarmcert::identification {
 namespace {
-FILE* dbg() {
-  static FILE* f = fopen("/tmp/dbg", "a");
-  setbuf(f, nullptr);
-  return f;
-}
 
-/// A formula replaces named effects if it leaves less than this fraction of the mean square, which favours names.
-constexpr double kClearlyLess = 0.9;
+/// Returns whether the registry has the effect.
+bool is_of_library(const std::string& effect) {
+  const std::vector<std::string> names = stability::effect_names();
+  return std::find(names.begin(), names.end(), effect) != names.end();
+}
 
 /// Returns whether a coefficient is as large as it may be. A bound of zero is one of the sign, which no effect reaches.
 bool is_at_bound(const stability::EffectInfo& library, const Refined& refined) {
@@ -80,13 +70,11 @@ void add_drag_law(const ScanSamples& left, Explained& explained) {
 }
 
 /// Scans the remainder beside the effects found.
-/// @return the samples of that remainder
-ScanSamples scan_what_is_left(const Passes& passes, Explained& explained) {
-  ScanSamples left = scan_samples(passes, specs_of(explained.settled.ranking));
+void scan_what_is_left(const Passes& passes, Explained& explained) {
+  const ScanSamples left = scan_samples(passes, specs_of(explained.settled.ranking));
   explained.scan = scan(left, passes.jobs);
   explained.formulas = find_formulas(left, explained.scan, kMostFormulas, passes.jobs);
   if (explained.has_drag_law) add_drag_law(left, explained);
-  return left;
 }
 
 /// Returns the refined effects in their order.
@@ -163,11 +151,8 @@ std::set<std::string> unhelpful(const Selected& selected) {
 
 void set_evidence(const evidence::Explanations& found, std::vector<Missing>& ranking) {
   for (std::size_t i = 0; i < ranking.size(); ++i) {
-    Finding& finding = ranking[i].finding;
-    finding.evidence_bits = found.effects[i].evidence_bits;
-    finding.rivals.clear();
-    for (const auto& [name, odds] : found.effects[i].others)
-      finding.rivals.push_back({name, stability::effect_info(name).excitation, odds});
+    ranking[i].finding.evidence_bits = found.effects[i].evidence_bits;
+    ranking[i].finding.rivals = found.effects[i].rivals;
   }
 }
 
@@ -187,40 +172,36 @@ std::optional<Candidate> swinging_load(const Passes& passes, const Coverage& cov
   return may_be_load ? visible_pendulum(passes, covered, beside) : std::nullopt;
 }
 
-/// Weighs the candidates, without those that prove doubtful.
-Explained settle(const Passes& passes, std::vector<Candidate> candidates) {
-  constexpr int kMostRounds = 4;
-  Explained result;
-  Settled& settled = result.settled;
-  for (int round = 0; round < kMostRounds; ++round) {
-    const evidence::Explanations found = evidence::explanations(passes, candidates);
+/// Weighs the candidates, until none that is named is doubtful: at a bound, of another form than the flights show, or of
+/// no help to predict held-out blocks.
+void settle(const Passes& passes, const std::vector<Candidate>& candidates, Explained& result) {
+  evidence::Hypotheses hypotheses = evidence::hypotheses(passes, candidates);
+  Settled& settled = result.settled = {};
+  std::set<std::string> doubtful;
+  do {
+    const evidence::Explanations found = evidence::explanations(passes, hypotheses);
     settled.selected = selected_of(passes, candidates, found);
     settled.ranking = ranking_of(passes, settled.selected);
     set_evidence(found, settled.ranking);
     result.has_drag_law = found.has_drag_curve;
-    const std::set<std::string> beyond = out_of_bounds(settled.selected);
-    settled.at_bound.insert(beyond.begin(), beyond.end());
-    std::set<std::string> doubtful = unhelpful(settled.selected);
-    if (true)
-      for (const auto& n : doubtful) fprintf(dbg(), "  DBG unhelpful %s\n", n.c_str());
-    doubtful.insert(beyond.begin(), beyond.end());
+    doubtful = out_of_bounds(settled.selected);
+    settled.at_bound.insert(doubtful.begin(), doubtful.end());
+    doubtful.merge(unhelpful(settled.selected));
     doubtful.insert(found.refuted.begin(), found.refuted.end());
-    for (const auto& n : found.refuted) fprintf(dbg(), "  DBG refuted %s\n", n.c_str());
-    if (doubtful.empty()) break;
     settled.suspected.insert(settled.suspected.end(), doubtful.begin(), doubtful.end());
-    erase(candidates, doubtful);
-  }
-  return result;
+    hypotheses.excluded.insert(doubtful.begin(), doubtful.end());
+  } while (!doubtful.empty());
 }
 
 }  // namespace
 
 Explained explain(const Passes& passes, const Coverage& covered) {
   std::vector<Candidate> candidates = candidates_to_weigh(passes, covered);
-  Explained explained = settle(passes, candidates);
+  Explained explained;
+  settle(passes, candidates, explained);
   if (const auto load = swinging_load(passes, covered, explained.settled.ranking)) {
     candidates.push_back(*load);
-    explained = settle(passes, candidates);
+    settle(passes, candidates, explained);
   }
   explained.settled.rest = remainder(passes, specs_of(explained.settled.ranking));
   scan_what_is_left(passes, explained);
@@ -246,6 +227,7 @@ std::optional<std::pair<double, double>> fit_to_all(const Passes& all, const Pas
     Finding next = found[i];
     next.member = finding.member;
     next.rivals = std::move(finding.rivals);
+    next.evidence_bits = finding.evidence_bits;
     next.model_form = std::move(finding.model_form);
     finding = std::move(next);
   }

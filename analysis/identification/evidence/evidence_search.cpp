@@ -163,7 +163,8 @@ Option EvidenceSearch::option(const Set& set, std::size_t entry) const {
 std::vector<Option> EvidenceSearch::options(const Set& set) const {
   std::vector<Option> result;
   for (std::size_t e = 0; e < all_.entries.size(); ++e) {
-    if (!has_entry(all_, set, e)) result.push_back(option(set, e));
+    if (!has_entry(all_, set, e) && all_.excluded.count(all_.entries[e].name) == 0)
+      result.push_back(option(set, e));
   }
   std::sort(result.begin(), result.end(), [](const Option& a, const Option& b) { return a.score > b.score; });
   return result;

@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
 
 #include "analysis/identification/evidence/evidence_search.h"
 #include "analysis/identification/evidence/projection.h"
@@ -11,11 +9,6 @@
 
 namespace swarmcert::evidence {
 namespace {
-FILE* dbg() {
-  static FILE* f = fopen("/tmp/dbg", "a");
-  setbuf(f, nullptr);
-  return f;
-}
 
 /// The best set, with the data that it explains.
 struct Found {
@@ -37,11 +30,6 @@ Found found_on(const identification::Passes& passes, const Projection& projectio
   found.best = EvidenceSearch(all, found.data).weigh(start);
   for (int step = 0; step < kMostSteps; ++step) {
     Weighed next = EvidenceSearch(all, found.data).next(found.best);
-    {
-      std::string w;
-      for (const Item& i : next.set) w += " " + all.entries[i.entry].name;
-      fprintf(dbg(), "    step %d %.1f:%s\n", step, next.score, w.c_str());
-    }
     if (has_same_entries(next.set, found.best.set)) break;
     found.best = with_free_shapes(passes, projection, all, found.data, std::move(next));
   }
@@ -99,42 +87,19 @@ Named named(const Hypotheses& all, const EvidenceSearch& search, const Weighed& 
                {}};
   result.candidate.thetas = {candidate.thetas[std::min(item.shape, candidate.thetas.size() - 1)]};
   for (const Option& other : search.instead_of(best, index))
-    result.others.emplace_back(all.entries[other.item.entry].name, std::exp(other.score - best.score));
+    result.rivals.push_back({all.entries[other.item.entry].name,
+                             all.candidates[other.item.entry].info.excitation,
+                             std::exp(other.score - best.score)});
   return result;
 }
 
 }  // namespace
 
-Explanations explanations(const identification::Passes& passes,
-                          const std::vector<identification::Candidate>& candidates) {
-  Hypotheses all = hypotheses(passes, candidates);
+Explanations explanations(const identification::Passes& passes, Hypotheses& all) {
   Explanations result;
   result.is_by_set_points = all.instruments[0].size() > 0;
   Found found = result.is_by_set_points ? found_by_set_points(passes, all) : found_in_everything(passes, all);
   const EvidenceSearch search(all, found.data);
-  if (true) {
-    Eigen::Index at = 0;
-    for (std::size_t i = 0; i < found.best.set.size(); ++i) {
-      const Item& item = found.best.set[i];
-      const Entry& e = all.entries[item.entry];
-      fprintf(dbg(), "  DBG %s shape %zu of %zu bits %.1f c", e.name.c_str(), item.shape, e.shapes,
-              search.bits(found.best, i));
-      for (int c = 0; c < std::min(e.size, 3); ++c)
-        fprintf(dbg(), " %.4g+-%.2g", found.best.coefficients[at + c],
-                std::sqrt(found.best.covariance(at + c, at + c)));
-      if (e.kind == Kind::kEffect && item.shape < all.candidates[item.entry].thetas.size())
-        for (double t : all.candidates[item.entry].thetas[item.shape]) fprintf(dbg(), " th %.4g", t);
-      for (const Option& o : search.instead_of(found.best, i))
-        fprintf(dbg(), " | %s %.1f", all.entries[o.item.entry].name.c_str(),
-                (o.score - found.best.score) / std::log(2.0));
-      fprintf(dbg(), "\n");
-      at += e.size;
-    }
-    fprintf(dbg(), "  DBG score %.1f bits, misfit %.2f, set points %d\n",
-            (found.best.score + found.data.data_square() / 2) / std::log(2.0),
-            search.left_by(found.best).squaredNorm() / (double)found.data.data().size(),
-            (int)result.is_by_set_points);
-  }
   Eigen::Index first = 0;
   for (std::size_t i = 0; i < found.best.set.size(); ++i) {
     const Entry& entry = all.entries[found.best.set[i].entry];

@@ -2,11 +2,10 @@
 #pragma once
 
 #include <string>
-#include <utility>
 #include <vector>
 
-#include "analysis/identification/candidates.h"
-#include "analysis/identification/passes.h"
+#include "analysis/identification/evidence/hypotheses.h"
+#include "analysis/identification/findings.h"
 
 namespace swarmcert::evidence {
 
@@ -16,8 +15,7 @@ struct Named {
   std::size_t index = 0;                ///< among the candidates
   double evidence_bits = 0;             ///< by which the set loses without it
   double value = 0, deviation = 0;      ///< estimate of the first coefficient, with its standard deviation
-  /// Effects that flights cannot tell from it, with their odds over it.
-  std::vector<std::pair<std::string, double>> others;
+  std::vector<identification::Rival> rivals;  ///< effects that flights cannot tell from it
 };
 
 struct Explanations {
@@ -32,9 +30,9 @@ struct Explanations {
   bool is_by_set_points = false;
 };
 
-/// Returns the best set of `candidates` and free curves for the residual of all flights. The deviations hold for the
-/// shape of the single theta.
-Explanations explanations(const identification::Passes& passes,
-                          const std::vector<identification::Candidate>& candidates);
+/// Returns the best set of effects and free curves for the residual of all flights of `passes`. The deviations hold for
+/// the shape of the single theta.
+/// @param all of these flights; shapes off the grid are added
+Explanations explanations(const identification::Passes& passes, Hypotheses& all);
 
 }  // namespace swarmcert::evidence

@@ -125,7 +125,7 @@ void TrackColumns::add_effects(const identification::Passes& passes, const Model
 void TrackColumns::add_curves(const identification::Passes& passes, const ModelledTrack& modelled,
                               const std::vector<CurveOver>& curves,
                               const std::vector<stability::Instant>& instants) {
-  const Eigen::Index count = static_cast<Eigen::Index>(curves.size()) * Curve::kSize + 3;
+  const Eigen::Index count = static_cast<Eigen::Index>(curves.size()) * Curve::kSize + 6;
   const Eigen::Index first = values_[0].cols() - 1 - count;
   residuals::MeasuredForce measured(modelled.track, modelled.model, static_cast<int>(count));
   Eigen::Matrix3Xd forces(3, count);
@@ -139,7 +139,7 @@ void TrackColumns::add_curves(const identification::Passes& passes, const Modell
       force.setZero();
       if (std::isfinite(value)) force = curves[c].direction(now) * curves[c].curve(value).transpose();
     }
-    forces.rightCols<3>() = now.R_WB;
+    forces.rightCols<6>() << now.R_WB, now.thrust_N * now.R_WB.leftCols<2>(), Eigen::Vector3d::Zero();
     if (!passes.inputs.rules.has_published_signals()) measured.apply(now, forces);
     for (std::size_t axis = 0; axis < 3; ++axis)
       values_[axis].row(static_cast<Eigen::Index>(i)).segment(first, count) =

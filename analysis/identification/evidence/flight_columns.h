@@ -46,8 +46,8 @@ struct Survey {
 };
 Survey survey(const identification::Passes& passes);
 
-/// The forces in W of the columns of effects, of curves, of constant forces along the three axes of the body, and the
-/// residual, as the log would show them.
+/// The forces in W of the columns of effects, of curves, of forces along the axes of the body, constant (3) and in
+/// proportion to the thrust (2, and one that is 0), and the residual, as the log would show them.
 class TrackColumns {
  public:
   /// @param grams    defines the columns of effects
@@ -57,7 +57,7 @@ class TrackColumns {
                const std::vector<stability::Instant>& instants);
 
   static Eigen::Index width(const identification::Grams& grams, const std::vector<CurveOver>& curves) {
-    return body_column(grams, curves) + 3;
+    return body_column(grams, curves) + 6;
   }
   /// Returns the first column of the forces along the axes of the body.
   static Eigen::Index body_column(const identification::Grams& grams, const std::vector<CurveOver>& curves) {

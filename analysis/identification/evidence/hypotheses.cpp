@@ -182,7 +182,7 @@ Hypotheses hypotheses(const identification::Passes& passes,
   const Spectral spectral(surveyed.stretches);
   const NoiseModel noise(spectral.bands(), Eigen::Vector3d::Constant(std::pow(kSensor * weight_N, 2)));
   const Eigen::Index width = TrackColumns::width(grams, surveyed.curves);
-  Hypotheses result{candidates, {}, surveyed, spectral, noise, {}, {}, {}};
+  Hypotheses result{candidates, {}, surveyed, spectral, noise, {}, {}, {}, {}};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     result.columns[axis].setZero(spectral.rows(), width);
     result.residual_N[axis].setZero(spectral.rows());
@@ -202,8 +202,11 @@ Hypotheses hypotheses(const identification::Passes& passes,
       });
   for (std::size_t k = 0; k < candidates.size(); ++k) {
     std::vector<int> first_column = grams.first_column[k];
-    if (candidates[k].info.traits.may_turn_with_body && candidates[k].vehicles.empty())
-      first_column.push_back(static_cast<int>(TrackColumns::body_column(grams, surveyed.curves)));
+    if (candidates[k].info.traits.may_turn_with_body && candidates[k].vehicles.empty()) {
+      const auto in_body = static_cast<int>(TrackColumns::body_column(grams, surveyed.curves));
+      first_column.push_back(in_body);
+      first_column.push_back(in_body + 3);
+    }
     result.entries.push_back(entry_of(candidates[k], std::move(first_column), energy, weight_N));
   }
   int column = grams.columns;

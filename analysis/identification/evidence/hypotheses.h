@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -62,6 +63,7 @@ struct Hypotheses {
 
   /// By axis, [rows x instruments]; empty if a log has no set points.
   std::array<Eigen::MatrixXf, 3> instruments;
+  std::set<std::string> excluded;  ///< names of effects that are not weighed
 
   const Prior& prior_of(const Item& item) const;
   /// Returns ln of the share of the prior probability that falls to an item: half to effects and half to curves,
