@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <random>
 
 namespace swarmcert::evidence {
@@ -45,8 +44,10 @@ Eigen::MatrixXf mixtures(const Eigen::MatrixXf& columns) {
   std::normal_distribution<float> normal;
   Eigen::MatrixXf weights =
       Eigen::MatrixXf::NullaryExpr(columns.cols(), kMixtures, [&] { return normal(random); });
-  for (Eigen::Index c = 0; c < columns.cols(); ++c)
-    weights.row(c) /= std::max(columns.col(c).norm(), std::numeric_limits<float>::min());
+  for (Eigen::Index c = 0; c < columns.cols(); ++c) {
+    const float norm = columns.col(c).norm();
+    weights.row(c) *= norm > 0 ? 1 / norm : 0;
+  }
   return columns * weights;
 }
 
