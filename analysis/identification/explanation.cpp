@@ -172,8 +172,8 @@ std::optional<Candidate> swinging_load(const Passes& passes, const Coverage& cov
   return may_be_load ? visible_pendulum(passes, covered, beside) : std::nullopt;
 }
 
-/// Weighs the candidates, until none that is named is doubtful: at a bound, of another form than the flights show, or of
-/// no help to predict held-out blocks.
+/// Weighs the candidates, until none that is named is doubtful: at a bound, of another form than the flights show, or
+/// of no help to predict held-out blocks.
 void settle(const Passes& passes, const std::vector<Candidate>& candidates, Explained& result) {
   evidence::Hypotheses hypotheses = evidence::hypotheses(passes, candidates);
   Settled& settled = result.settled = {};

@@ -45,7 +45,7 @@ struct Energy {
   Eigen::ArrayXd squares, fourths;
 };
 
-/// Returns the sets of coefficients that may act: of up to three any of them, since a wind need not have all components.
+/// Returns the sets of coefficients that may act: of up to three any of them, as a wind need not have all components.
 std::vector<unsigned> acting(int size) {
   const unsigned all = (1U << std::min(size, 31)) - 1;
   if (size > 3) return {all};

@@ -37,8 +37,8 @@ Eigen::MatrixXf commanded_signals(const residuals::Track& track) {
   return signals;
 }
 
-/// Returns mixtures with random weights of the columns scaled to equal power, [rows x mixtures]. Nearly always, they span
-/// the strongest directions of the columns (Halko, Martinsson & Tropp 2011).
+/// Returns mixtures with random weights of the columns scaled to equal power, [rows x mixtures]. Nearly always, they
+/// span the strongest directions of the columns (Halko, Martinsson & Tropp 2011).
 Eigen::MatrixXf mixtures(const Eigen::MatrixXf& columns) {
   std::mt19937_64 random(1);
   std::normal_distribution<float> normal;
