@@ -156,15 +156,18 @@ void set_evidence(const evidence::Explanations& found, std::vector<Missing>& ran
   }
 }
 
-/// Returns a load on a string, if what is found may be a load and the flights show that it swings.
+/// Returns a load on a string, if part of the weight or a curve is found, and the flights show that it swings.
 std::optional<Candidate> swinging_load(const Passes& passes, const Coverage& covered,
-                                       const std::vector<Missing>& ranking) {
+                                       const Explained& explained) {
   const std::vector<stability::EffectSpec>& own = passes.inputs.model_of(passes.kind)->effects;
   if (std::any_of(own.begin(), own.end(), [](const auto& spec) { return swings(spec.name); })) return {};
+  const auto is_of_weight = [](const std::string& name) { return is_scale(name) || is_push(name); };
+  const Settled& settled = explained.settled;
+  bool may_be_load =
+      explained.has_curves || std::any_of(settled.suspected.begin(), settled.suspected.end(), is_of_weight);
   std::vector<stability::EffectSpec> beside;
-  bool may_be_load = false;
-  for (const Missing& missing : ranking) {
-    if (is_scale(missing.effect) || is_push(missing.effect))
+  for (const Missing& missing : settled.ranking) {
+    if (is_of_weight(missing.effect))
       may_be_load = true;
     else
       beside.insert(beside.end(), missing.specs.begin(), missing.specs.end());
@@ -184,6 +187,7 @@ void settle(const Passes& passes, const std::vector<Candidate>& candidates, Expl
     settled.ranking = ranking_of(passes, settled.selected);
     set_evidence(found, settled.ranking);
     result.has_drag_law = found.has_drag_curve;
+    result.has_curves = !found.curves.empty();
     doubtful = out_of_bounds(settled.selected);
     settled.at_bound.insert(doubtful.begin(), doubtful.end());
     doubtful.merge(unhelpful(settled.selected));
@@ -199,7 +203,7 @@ Explained explain(const Passes& passes, const Coverage& covered) {
   std::vector<Candidate> candidates = candidates_to_weigh(passes, covered);
   Explained explained;
   settle(passes, candidates, explained);
-  if (const auto load = swinging_load(passes, covered, explained.settled.ranking)) {
+  if (const auto load = swinging_load(passes, covered, explained)) {
     candidates.push_back(*load);
     settle(passes, candidates, explained);
   }

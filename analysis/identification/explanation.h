@@ -30,6 +30,7 @@ struct Explained {
   std::vector<Formula> formulas;
   /// A drag of no fixed exponent is part of the remainder.
   bool has_drag_law = false;
+  bool has_curves = false;  ///< free curves explain part of the residual
 };
 
 /// Names the effects that explain the residual of the flights of `passes` best (evidence/explanations.h), without those

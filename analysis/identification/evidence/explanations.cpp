@@ -62,11 +62,20 @@ Found found_in_everything(const identification::Passes& passes, Hypotheses& all)
   return found;
 }
 
-/// Returns whether a curve over the own variable of the effect at `index` has a tenth of its evidence.
+/// Returns the bits that the set loses with the constant form in the world of the item at `index`, if that has another.
+double lost_in_world(const EvidenceSearch& search, const Weighed& best, std::size_t index) {
+  Weighed in_world = best;
+  in_world.set[index].shape = 0;
+  return (best.score - search.weigh(in_world.set).score) / std::log(2.0);
+}
+
+/// Returns whether the form of the effect at `index` lacks a tenth of its evidence: a curve over its own variable has it,
+/// or only what turns with the body explains the flights.
 bool is_refuted(const Hypotheses& all, const EvidenceSearch& search, const Weighed& best, std::size_t index) {
   constexpr double kOfEffect = 0.1;
   const stability::EffectTraits& traits = all.candidates[best.set[index].entry].info.traits;
   const double least_bits = kOfEffect * search.bits(best, index);
+  if (traits.may_turn_with_body && lost_in_world(search, best, index) > least_bits) return true;
   for (std::size_t i = 0; i < best.set.size(); ++i) {
     const Entry& entry = all.entries[best.set[i].entry];
     if (entry.kind == Kind::kCurve && traits.varies_with(entry.variable) && search.bits(best, i) > least_bits)

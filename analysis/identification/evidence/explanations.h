@@ -20,8 +20,8 @@ struct Named {
 
 struct Explanations {
   std::vector<Named> effects;  ///< in the order of their evidence
-  /// Of the effects, those beside which the residual still varies with their own variable, by a tenth of their
-  /// evidence: their form does not match the flights.
+  /// Of the effects, those of another form than the flights show: a tenth of their evidence goes to a curve over their
+  /// own variable, or to what turns with the body.
   std::vector<std::string> refuted;
   std::vector<std::string> curves;  ///< free curves beside them: "force_z over z"
   bool has_drag_curve = false;      ///< one of them is a force against the velocity
