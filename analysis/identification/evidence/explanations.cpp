@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "analysis/identification/diagnose.h"
 #include "analysis/identification/evidence/evidence_search.h"
 #include "analysis/identification/evidence/projection.h"
 #include "analysis/identification/evidence/shapes.h"
@@ -102,9 +103,8 @@ Named named(const Hypotheses& all, const EvidenceSearch& search, const Weighed& 
   return result;
 }
 
-}  // namespace
-
-Explanations explanations(const identification::Passes& passes, Hypotheses& all) {
+/// Returns the best set without the excluded effects.
+Explanations best_explanations(const identification::Passes& passes, Hypotheses& all) {
   Explanations result;
   result.is_by_set_points = all.instruments[0].size() > 0;
   Found found = result.is_by_set_points ? found_by_set_points(passes, all) : found_in_everything(passes, all);
@@ -124,6 +124,24 @@ Explanations explanations(const identification::Passes& passes, Hypotheses& all)
   std::stable_sort(result.effects.begin(), result.effects.end(),
                    [](const Named& a, const Named& b) { return a.evidence_bits > b.evidence_bits; });
   return result;
+}
+
+}  // namespace
+
+Explanations explanations(const identification::Passes& passes, Hypotheses& all) {
+  for (;;) {
+    Explanations result = best_explanations(passes, all);
+    if (result.refuted.empty()) return result;
+    all.excluded.insert(result.refuted.begin(), result.refuted.end());
+  }
+}
+
+Explanations explanations(const residuals::Inputs& inputs, const std::string& kind, int jobs) {
+  const std::vector<int> flights = identification::every_flight(inputs);
+  const identification::Coverage covered = identification::coverage(inputs, kind, flights, jobs);
+  const identification::Passes passes = {inputs, kind, flights, covered.records, jobs, [](int, int) {}};
+  Hypotheses all = hypotheses(passes, identification::all_candidates(*inputs.model_of(kind), covered));
+  return explanations(passes, all);
 }
 
 }  // namespace swarmcert::evidence

@@ -30,9 +30,11 @@ struct Explanations {
   bool is_by_set_points = false;
 };
 
-/// Returns the best set of effects and free curves for the residual of all flights of `passes`. The deviations hold for
-/// the shape of the single theta.
-/// @param all of these flights; shapes off the grid are added
+/// Returns the best set of effects and free curves for the residual of all flights of `passes`, without effects that
+/// would be refuted. The deviations hold for the shape of the single theta.
+/// @param all of these flights; shapes off the grid are added, and refuted effects excluded
 Explanations explanations(const identification::Passes& passes, Hypotheses& all);
+/// Likewise of all flights of `inputs` by vehicles of `kind`, for all candidates.
+Explanations explanations(const residuals::Inputs& inputs, const std::string& kind, int jobs);
 
 }  // namespace swarmcert::evidence
