@@ -70,8 +70,8 @@ double lost_in_world(const EvidenceSearch& search, const Weighed& best, std::siz
   return (best.score - search.weigh(in_world.set).score) / std::log(2.0);
 }
 
-/// Returns whether the form of the effect at `index` lacks a tenth of its evidence: a curve over its own variable has it,
-/// or only what turns with the body explains the flights.
+/// Returns whether the form of the effect at `index` lacks a tenth of its evidence: a curve over its own variable has
+/// it, or only what turns with the body explains the flights.
 bool is_refuted(const Hypotheses& all, const EvidenceSearch& search, const Weighed& best, std::size_t index) {
   constexpr double kOfEffect = 0.1;
   const stability::EffectTraits& traits = all.candidates[best.set[index].entry].info.traits;
