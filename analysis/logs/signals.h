@@ -66,7 +66,7 @@ std::string columns_name(int signal);
 /// Returns whether both scales are the same.
 bool is_same_scale(const UnitFactor& a, const UnitFactor& b);
 
-/// Returns the unit of columns.toml that has this factor; empty if there is none.
+/// Returns the unit of columns.toml that has this factor; empty if no unit has it.
 std::string unit_of_factor(int signal, const UnitFactor& factor);
 
 /// Returns whether both give the same columns the same signals and units.

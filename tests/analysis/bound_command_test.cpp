@@ -74,7 +74,7 @@ TEST(BoundCommand, WritesNoCertificateWhereTheDelayIsLongAgainstTheLagsAndSaysWh
   const Outcome outcome = run_shell("swarmcert bound" + gains + " --verified -o cert.json", folder.path());
   EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
   EXPECT_NE(outcome.output.find("no certificate"), std::string::npos) << outcome.output;
-  EXPECT_NE(outcome.output.find("more than 5 % wide"), std::string::npos) << outcome.output;
+  EXPECT_NE(outcome.output.find("more than 5 % above the enclosure"), std::string::npos) << outcome.output;
   EXPECT_FALSE(std::filesystem::exists(folder / "cert.json"));
   EXPECT_EQ(run_shell("swarmcert bound" + kFlown + " -o cert.json", folder.path()).exit_code, 2);
 }

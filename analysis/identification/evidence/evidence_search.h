@@ -39,7 +39,7 @@ class EvidenceSearch {
   EvidenceSearch(const Hypotheses& all, const Whitened& data) : all_(all), data_(data) {}
 
   /// Takes a step to a better set: adds an effect, or removes or exchanges something, or adds a curve. Returns `now` if
-  /// there is none.
+  /// no step is better.
   Weighed next(const Weighed& now) const;
   /// Returns the effects that flights cannot tell from the item at `index`: those with which, in its place,
   /// the set loses less than kNamed_bits, whatever was likely before the flights; best first.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "analysis/identification/diagnose.h"
 #include "analysis/identification/evidence/evidence_search.h"
@@ -90,7 +91,6 @@ Named named(const Hypotheses& all, const EvidenceSearch& search, const Weighed& 
   const Item& item = best.set[index];
   const identification::Candidate& candidate = all.candidates[item.entry];
   Named result{candidate,
-               item.entry,
                search.bits(best, index),
                best.coefficients[first],
                std::sqrt(best.covariance(first, first)),
@@ -104,10 +104,24 @@ Named named(const Hypotheses& all, const EvidenceSearch& search, const Weighed& 
 }
 
 /// Returns the best set without the excluded effects.
-Explanations best_explanations(const identification::Passes& passes, Hypotheses& all) {
+Found best_found(const identification::Passes& passes, Hypotheses& all) {
+  return all.has_set_points() ? found_by_set_points(passes, all) : found_in_everything(passes, all);
+}
+
+/// Returns the names of the effects of a set that are refuted.
+std::set<std::string> refuted(const Hypotheses& all, const Found& found) {
+  const EvidenceSearch search(all, found.data);
+  std::set<std::string> names;
+  for (std::size_t i = 0; i < found.best.set.size(); ++i) {
+    const Entry& entry = all.entries[found.best.set[i].entry];
+    if (entry.kind == Kind::kEffect && is_refuted(all, search, found.best, i)) names.insert(entry.name);
+  }
+  return names;
+}
+
+Explanations described(const Hypotheses& all, const Found& found) {
   Explanations result;
-  result.is_by_set_points = all.instruments[0].size() > 0;
-  Found found = result.is_by_set_points ? found_by_set_points(passes, all) : found_in_everything(passes, all);
+  result.is_by_set_points = all.has_set_points();
   const EvidenceSearch search(all, found.data);
   Eigen::Index first = 0;
   for (std::size_t i = 0; i < found.best.set.size(); ++i) {
@@ -116,9 +130,6 @@ Explanations best_explanations(const identification::Passes& passes, Hypotheses&
       result.effects.push_back(named(all, search, found.best, i, first));
     else
       result.curves.push_back(entry.name);
-    if (entry.kind == Kind::kEffect && is_refuted(all, search, found.best, i))
-      result.refuted.push_back(entry.name);
-    if (entry.name == kDragCurve) result.has_drag_curve = true;
     first += entry.size;
   }
   std::stable_sort(result.effects.begin(), result.effects.end(),
@@ -130,9 +141,10 @@ Explanations best_explanations(const identification::Passes& passes, Hypotheses&
 
 Explanations explanations(const identification::Passes& passes, Hypotheses& all) {
   for (;;) {
-    Explanations result = best_explanations(passes, all);
-    if (result.refuted.empty()) return result;
-    all.excluded.insert(result.refuted.begin(), result.refuted.end());
+    const Found found = best_found(passes, all);
+    const std::set<std::string> names = refuted(all, found);
+    if (names.empty()) return described(all, found);
+    all.excluded.insert(names.begin(), names.end());
   }
 }
 

@@ -18,9 +18,6 @@ enum class Kind {
   kCurve  ///< a free curve over a variable, along one axis
 };
 
-/// The name of the free curve along the velocity over the speed.
-inline constexpr char kDragCurve[] = "drag over speed";
-
 /// A normal distribution of coefficients.
 struct Prior {
   Eigen::VectorXd mean;
@@ -65,6 +62,7 @@ struct Hypotheses {
   std::array<Eigen::MatrixXf, 3> instruments;
   std::set<std::string> excluded;  ///< names of effects that are not weighed
 
+  bool has_set_points() const { return instruments[0].size() > 0; }
   const Prior& prior_of(const Item& item) const;
   /// Returns ln of the share of the prior probability that falls to an item: half to effects and half to curves,
   /// equally to their entries, equally to their shapes and priors. An effect that varies is 128 times less likely than

@@ -84,7 +84,6 @@ Eigen::VectorXd steps(const identification::Passes& passes, const Projection& pr
   Eigen::MatrixXd J(data.data().size(), width + parameters);
   for (Eigen::Index c = 0; c < width; ++c)
     J.col(c) = data.columns().col(columns[static_cast<std::size_t>(c)]).cast<double>();
-  const Eigen::VectorXd left = data.data().cast<double>() - J.leftCols(width) * now.coefficients;
   const Eigen::MatrixXd moved =
       projection.of(evaluate(passes, all, moved_in_turn(all, now.set, free, kDifference))).cast<double>();
   const std::vector<Eigen::Index> first = places(all, now.set);
@@ -98,7 +97,7 @@ Eigen::VectorXd steps(const identification::Passes& passes, const Projection& pr
   }
   Eigen::MatrixXd hessian = J.transpose() * J;
   const Prior prior = search.prior_of(now.set);
-  Eigen::VectorXd pull = J.transpose() * left;
+  Eigen::VectorXd pull = J.transpose() * search.left_by(now);
   pull.head(width) += prior.precision * (prior.mean - now.coefficients);
   hessian.topLeftCorner(width, width) += prior.precision;
   hessian.diagonal().tail(parameters).array() += 1;  // a priori, within about a step of the grid

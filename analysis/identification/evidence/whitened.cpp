@@ -1,12 +1,18 @@
 #include "analysis/identification/evidence/whitened.h"
 
+#include <stdexcept>
+
 namespace swarmcert::evidence {
 
 Whitened::Whitened(Eigen::MatrixXf columns, Eigen::VectorXf data)
     : columns_(std::move(columns)),
       data_(std::move(data)),
       with_data_((columns_.transpose() * data_).cast<double>()),
-      data_square_(data_.cast<double>().squaredNorm()) {}
+      data_square_(data_.cast<double>().squaredNorm()) {
+  // Any comparison with NaN is false, so that a search would find nothing.
+  if (!columns_.allFinite() || !data_.allFinite())
+    throw std::domain_error("evidence: a column of an explanation, or the residual, is not finite");
+}
 
 void Whitened::append(const Eigen::MatrixXf& columns) {
   const Eigen::Index before = columns_.cols();

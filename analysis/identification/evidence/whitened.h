@@ -18,6 +18,7 @@ struct Normal {
 class Whitened {
  public:
   /// @param columns [numbers x columns]
+  /// @throws std::domain_error if a number is not finite
   Whitened(Eigen::MatrixXf columns, Eigen::VectorXf data);
 
   /// Adds columns behind the others.

@@ -8,6 +8,7 @@
 #include "stability/bounds/enclosures/contracting_system.h"
 #include "stability/bounds/enclosures/enclosed_state.h"
 #include "stability/bounds/enclosures/local_polynomial.h"
+#include "stability/bounds/enclosures/verified_delay.h"
 
 namespace swarmcert::stability {
 namespace {
@@ -122,7 +123,11 @@ VerifiedNorms times(VerifiedNorms norms, Interval factor) {
 /// @param integrates true: y is the response to a step; false: that to an impulse.
 std::optional<VerifiedNorms> norms_of(const TransferFunction& y, bool integrates) {
   if (y.delay_s == 0) return norms_over(y, intervals(sum(y.denominator, y.feedback)), integrates);
+  // A delay that is short compared with the slowest mode takes many steps, but its expansion may be accurate.
+  constexpr long kFewPieces = 30'000;
+  constexpr long kMostPieces = 400'000;
   constexpr double kSharp = 1e-3;
+  if (const auto norms = norms_by_steps(y, integrates, kFewPieces)) return norms;
   std::size_t order = y.denominator.size() - y.feedback.size();
   IntervalVector denominator;
   double rest = kInfinity;
@@ -130,6 +135,9 @@ std::optional<VerifiedNorms> norms_of(const TransferFunction& y, bool integrates
     IntervalVector expanded = with_expanded_delay(y, order);
     const double missed = rest_of_delay(y, order, expanded);
     if (missed < rest) rest = missed, denominator = std::move(expanded);
+  }
+  if (!(rest < kSharp)) {
+    if (const auto norms = norms_by_steps(y, integrates, kMostPieces)) return norms;
   }
   if (!(rest < 1)) return std::nullopt;
   std::optional<VerifiedNorms> norms = norms_over(y, denominator, integrates);

@@ -28,13 +28,14 @@ inline constexpr std::array<Interval VerifiedNorms::*, 4> kVerifiedGains = {
 /// round-off, is bounded per step by interval Taylor coefficients with remainder, and summed. Between steps the
 /// response is its Taylor polynomial; segments on which its sign is uncertain are halved, down to 2^-30 of a step.
 ///
-/// A delay T is expanded, which is accurate if it is short; verified_sampled_norms.h encloses the loop that flies with
-/// any delay. e^(-Ts) = R(s) + rest, with R the Taylor polynomial of the highest degree k for which D0 = denominator +
-/// feedback R is no less proper, one per lag. The rest is (-s)^(k+1) int_0^T (T - u)^k/k! e^(-us) du (Taylor), a kernel
-/// of one sign and of norm T^(k+1)/(k+1)! behind k + 1 derivatives. With lambda = T^(k+1)/(k+1)! |s^(k+1)
-/// feedback/D0|_1 (a jump at 0 counts) the true response y is y0 - k * y, y0 that of D0 and |k|_1 <= lambda: if
-/// lambda < 1 the loop is stable (Neumann series), and every norm of y lies between those of y0 over 1 + lambda and
-/// over 1 - lambda. Lower degrees are tried if lambda is above 0.001.
+/// A delay T is treated by the method of steps, verified a posteriori (verified_delay.h). If that takes many segments
+/// because the delay is short compared with the slowest mode, an expansion is tried first: e^(-Ts) = R(s) + rest, with
+/// R the Taylor polynomial of the highest degree k for which D0 = denominator + feedback R is no less proper, one per
+/// lag. The rest is (-s)^(k+1) int_0^T (T - u)^k/k! e^(-us) du (Taylor), a kernel of one sign and of norm
+/// T^(k+1)/(k+1)! behind k + 1 derivatives. With lambda = T^(k+1)/(k+1)! |s^(k+1) feedback/D0|_1 (a jump at 0 counts)
+/// the true response y is y0 - k * y, y0 that of D0 and |k|_1 <= lambda: if lambda < 1 the loop is stable (Neumann
+/// series), and every norm of y lies between those of y0 over 1 + lambda and over 1 - lambda. Lower degrees are tried
+/// if lambda is above 0.001.
 std::optional<VerifiedNorms> verified_norms(const AxisLoop& loop, Channel channel);
 
 /// The same for errors of an estimate, as in continuous_norms(): for the doubles of position_error_transfer(), or those
