@@ -20,7 +20,7 @@ inline constexpr std::array<Interval VerifiedNorms::*, 4> kVerifiedGains = {
     &VerifiedNorms::rate, &VerifiedNorms::amplitude, &VerifiedNorms::edge, &VerifiedNorms::impulse};
 
 /// Encloses the gains of a loop; without Ki the rate gain is infinite. Returns nothing if stability could not be
-/// verified, as with a delay that is not short.
+/// verified.
 ///
 /// Coordinates w = R x are chosen such that the symmetric part of A = R companion R^-1 is verified to lie below -alpha
 /// I (interval Cholesky). Then |exp(At)|_2 <= e^(-alpha t), so errors of the computed trajectory never grow, and its
