@@ -29,8 +29,8 @@ std::vector<double> thrust_of(const Log& log) {
   return thrust;
 }
 
-/// Returns whether the commands of the motors, of which the typical sum is `common`, are too small to carry any vehicle.
-/// If it climbs nevertheless, their unit is another one.
+/// Returns whether the commands of the motors, whose sum is typically `common`, are too small to carry any vehicle. If
+/// it climbs nevertheless, their unit is another one.
 bool are_motors_off(const Log& log, double common) {
   constexpr double kClimb_m = 0.2;
   const double command = log.signals.thrust == ThrustSource::kDuty ? common / 4 : log.hover_command;
