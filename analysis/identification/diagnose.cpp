@@ -8,11 +8,10 @@
 #include <set>
 
 #include "analysis/identification/balance/torque_balance.h"
-#include "analysis/identification/battery_rival.h"
-#include "analysis/identification/closed_loop.h"
 #include "analysis/identification/column_memory.h"
 #include "analysis/identification/rotors/lone_rotor.h"
 #include "analysis/identification/scan/named_forms.h"
+#include "analysis/identification/selected.h"
 #include "analysis/identification/swinging_load.h"
 #include "nn/base/doubles.h"
 #include "stability/effects/registry.h"
@@ -46,79 +45,6 @@ ThrustScale thrust_scale(const Passes& passes, const Coverage& covered, const st
   scale.value.instrument += own;
   scale.value.interval = {scale.value.interval.lower + own, scale.value.interval.upper + own};
   return scale;
-}
-
-/// If setpoints show a thrust scale that least squares attribute to a constant force, reports it with that force:
-/// thrust that hardly varies looks like a constant force, and its reaction to disturbances hides the rest.
-void name_hidden_scale(const stability::Model& model, const ThrustScale& scale,
-                       std::vector<Missing>& ranking) {
-  constexpr double kSurely = 2;  // half-widths of the 90 % interval
-  const Interval& interval = scale.value.interval;
-  const double excess = std::abs(scale.value.instrument - own_thrust_ratio(model));
-  if (!scale.is_known || excess <= kSurely * (interval.upper - interval.lower) / 2) return;
-  const std::string name = stability::plain_effect(stability::Family::kThrustScale);
-  const auto names_scale = [&](const Missing& missing) { return missing.effect == name; };
-  if (std::any_of(ranking.begin(), ranking.end(), names_scale)) return;
-  for (Missing& missing : ranking) {
-    if (!is_push(missing.effect)) continue;
-    const std::vector<std::string> rivals = missing.finding.confounded_with();
-    if (std::find(rivals.begin(), rivals.end(), name) != rivals.end()) continue;
-    missing.finding.rivals.push_back({name, stability::effect_info(name).excitation});
-  }
-}
-
-/// Returns whether a curve of the scan explains at least as much as a constant fraction of the thrust; then the cause
-/// is not a scale.
-bool is_explained_by_curve(const Scan& scan, double rmse_N) {
-  return std::any_of(scan.entries.begin(), scan.entries.end(), [&](const ScanEntry& entry) {
-    return entry.variable != "thrust" && entry.variable != "body_constant" && entry.rmse_after <= rmse_N;
-  });
-}
-
-/// Reports an effect that halves the error even if setpoints do not confirm it: at least as one of a class, with the
-/// rivals that halve the error as well. Only thrust scales and a constant force are simple enough for that without
-/// further evidence.
-/// @param all flights from which the values of the effects found in `passes` are computed
-void name_what_halves(const Passes& all, const Passes& passes, Diagnosis& result) {
-  constexpr double kQuarter = 0.25;  // of the mean square
-  if (result.suspected.empty() && result.contradicted.empty() && result.scan.entries.empty()) return;
-  const residuals::Inputs left = inputs_with(passes, specs_of(result.ranking));
-  const std::vector<int> flights = every_flight(left);
-  const Coverage covered = coverage(left, passes.kind, flights, passes.jobs);
-  std::vector<Candidate> candidates;
-  for (const std::string& name : stability::effect_names()) {
-    if (is_scale(name) || is_push(name))
-      candidates.push_back(candidate(name, *left.model_of(passes.kind), covered));
-  }
-  const Grams grams =
-      block_grams({left, passes.kind, flights, passes.records, passes.jobs, [](int, int) {}}, candidates);
-  const Selection selection(grams);
-  if (!selection.is_sound()) return;
-  const double before = selection.mean_square({});
-  std::vector<std::string> names;
-  double least = kQuarter * before;
-  for (int k = 0; k < static_cast<int>(candidates.size()); ++k) {
-    const double square = selection.mean_square({selection.best_theta({}, k)});
-    if (square > kQuarter * before) continue;
-    names.push_back(candidates[static_cast<std::size_t>(k)].name);
-    least = std::min(least, square);
-  }
-  if (names.empty() || is_explained_by_curve(result.scan, std::sqrt(least))) return;
-  std::vector<Missing> found = fit_effects(inputs_with(all, specs_of(result.ranking)), passes.kind,
-                                           {names[0]}, flights, passes.jobs, [](int, int) {});
-  for (std::size_t i = 1; i < names.size(); ++i) {
-    std::vector<Rival>& rivals = found[0].finding.rivals;
-    const bool is_known = std::any_of(rivals.begin(), rivals.end(),
-                                      [&](const Rival& rival) { return rival.effect == names[i]; });
-    if (!is_known) rivals.push_back({names[i], stability::effect_info(names[i]).excitation});
-  }
-  result.ranking.insert(result.ranking.begin(), std::move(found[0]));
-  result.rmse_after_N = std::sqrt(least);
-  const auto drop = [&](std::vector<std::string>& list) {
-    list.erase(std::remove(list.begin(), list.end(), names[0]), list.end());
-  };
-  drop(result.suspected);
-  drop(result.contradicted);
 }
 
 /// Returns the effects found in the mean torques, unless a single rotor may be the cause, which the scan decides.
@@ -205,7 +131,6 @@ Diagnosis diagnose(const residuals::Inputs& inputs, const std::string& kind, con
   Settled& settled = explained.settled;
   const Selected& selected = settled.selected;
   const Selection selection(selected.grams);
-  result.contradicted = selected.contradicted;
   result.suspected = std::move(settled.suspected);
   for (const std::string& name : result.suspected) {
     if (settled.at_bound.count(name) == 1) result.at_bound.push_back(name);
@@ -230,13 +155,9 @@ Diagnosis diagnose(const residuals::Inputs& inputs, const std::string& kind, con
   }
   result.ranking = std::move(settled.ranking);
   result.thrust_scale = thrust_scale(all, covered, selected.refined);
-  // A rival may be hidden in any of the effects found, such as the battery's: it is fitted without them.
-  name_hidden_scale(*inputs.model_of(kind), thrust_scale(all, covered, {}), result.ranking);
-  name_time_beside_battery(all, result.ranking);
   result.remainder = std::move(settled.rest);
   result.scan = std::move(explained.scan);
   result.formulas = std::move(explained.formulas);
-  name_what_halves(all, passes, result);
   // A force that nothing explains may follow the set points, and then the instrument's interval does not hold.
   if (result.remainder.stands_out() || !result.scan.entries.empty()) result.thrust_scale.is_known = false;
   scan_balance(passes, result);

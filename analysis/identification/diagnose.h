@@ -1,4 +1,4 @@
-/// @file Finds the missing effects: selection, refinement of shapes, check against closed-loop bias, remainder.
+/// @file Finds the missing effects, their values and intervals, and what remains beside them.
 #pragma once
 
 #include <string>
@@ -22,8 +22,7 @@ struct Diagnosis {
   std::string vehicle;   ///< if all flights are of a single vehicle; empty: of all vehicles of the kind
   std::string too_poor;  ///< why no answer is given; empty if there is one
   std::vector<Missing> ranking;
-  std::vector<std::string> contradicted;  ///< selected, but only an artefact of the controller's reaction
-  /// Selected, but too small beside the remainder, see explain().
+  /// Found, but not named, see explain().
   std::vector<std::string> suspected;
   std::vector<std::string> at_bound;  ///< of those: not identified, because a value ended at its bound
   std::vector<Detectable> detectable;

@@ -28,15 +28,14 @@ struct Explained {
   Settled settled;
   Scan scan;
   std::vector<Formula> formulas;
-  /// A drag with a free exponent replaces named drags. It is part of the remainder.
+  /// A drag of no fixed exponent is part of the remainder.
   bool has_drag_law = false;
+  bool has_curves = false;  ///< free curves explain part of the residual
 };
 
-/// Selects effects for the residual of the flights of `passes`. A named effect is accepted only if it explains about as
-/// much as the best formula would in its place and is not too small beside the remainder. If the ratio of the remainder
-/// exceeds kLoudRatio, an effect must remove a tenth of the mean square, and setpoints must confirm the size of an
-/// effect of the thrust. If the remainder stands out at all, a position-dependent force, or a fraction of the thrust
-/// below two percent of the weight, must remove more than what is left above the noise.
+/// Names the effects that explain the residual of the flights of `passes` best (evidence/explanations.h), without those
+/// that end at a bound, that do not lower the error of held-out blocks, or beside which the residual still varies with
+/// their own variable.
 Explained explain(const Passes& passes, const Coverage& covered);
 
 /// Recomputes values, intervals and errors of the effects of `explained`, which were found on the excerpt `seen` of the

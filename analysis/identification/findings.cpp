@@ -40,53 +40,6 @@ void widen(std::vector<Interval>& spread, const Eigen::VectorXd& values) {
   }
 }
 
-/// Returns `members` with the last one at the best theta of its grid, because rivals are not refined either.
-Members on_grid(const Selection& selection, const Members& members) {
-  const Candidate& candidate = selection.candidate(members.back());
-  const auto count = static_cast<int>(candidate.thetas.size() - candidate.refined_thetas);
-  const Members rest = without(members, members.size() - 1);
-  Members best = members;
-  double least = kInfinity;
-  for (int theta = 0; theta < count; ++theta) {
-    Members tried = with(rest, {members.back().candidate, theta});
-    const double square = selection.mean_square(tried);
-    if (square >= least) continue;
-    least = square;
-    best = std::move(tried);
-  }
-  return best;
-}
-
-/// Finds rivals of the last of `members`: they keep at least half of its gain, and the data do not clearly prefer it.
-void find_rivals(const Selection& selection, const Members& members, Finding& finding) {
-  constexpr double kClearlyBetter_z = 2, kShare = 0.5;
-  const Members rest = without(members, members.size() - 1);
-  const double rest_square = selection.mean_square(rest), full_square = selection.mean_square(members);
-  const std::vector<double> full_errors = selection.block_errors(on_grid(selection, members));
-  const Eigen::Index p = selection.candidate(members.back()).columns();
-  for (int q = 0; q < static_cast<int>(selection.grams().candidates.size()); ++q) {
-    if (selection.is_present(members, q)) continue;
-    if (is_formula(selection.grams().candidates[static_cast<std::size_t>(q)].name)) continue;
-    const Member rival = selection.best_theta(rest, q);
-    const Members instead = with(rest, rival);
-    const bool explains = rest_square - selection.mean_square(instead) > kShare * (rest_square - full_square);
-    if (!explains) continue;
-    const Candidate& other = selection.candidate(rival);
-    // A constant force for all and one per vehicle have the same name.
-    const bool is_known = std::any_of(finding.rivals.begin(), finding.rivals.end(),
-                                      [&](const Rival& r) { return r.effect == other.name; });
-    if (!is_known && paired_z(selection.block_errors(instead), full_errors) < kClearlyBetter_z) {
-      const double kept = (rest_square - selection.mean_square(instead)) / (rest_square - full_square);
-      const double squared = finding.wald_z * finding.wald_z;
-      finding.rivals.push_back({other.name, other.info.excitation,
-                                std::exp(log_likelihood_ratio(kept * squared, full_errors.size()) -
-                                         log_likelihood_ratio(squared, full_errors.size()))});
-    }
-    const Members both = with(instead, members.back());
-    widen(finding.model_form, selection.in_model(both, selection.coefficients(both)).tail(p));
-  }
-}
-
 }  // namespace
 
 double log_likelihood_ratio(double squared_wald, std::size_t blocks) {
@@ -126,7 +79,6 @@ std::vector<Finding> findings(const Selection& selection, const Members& members
     for (Eigen::Index c = 0; c < p; ++c) finding.model_form.emplace_back(own[c], own[c]);
     for (const Eigen::VectorXd& fold : selection.fold_coefficients(last))
       widen(finding.model_form, selection.in_model(last, fold).tail(p));
-    find_rivals(selection, last, finding);
     result.push_back(std::move(finding));
   }
   return result;

@@ -1,4 +1,4 @@
-/// @file Findings about each selected effect, and its rivals.
+/// @file Findings about each selected effect.
 #pragma once
 
 #include <limits>
@@ -27,14 +27,14 @@ struct Finding {
   double rmse_before_N = 0, rmse_after_N = 0;  ///< cross-validated, of the vector
   Interval drop_interval;  ///< 90 % interval of the relative fall of the RMSE, by resampling blocks
   double paired_z = 0, wald_z = 0;
-  /// Logarithm of the odds over a model without the effect: n/2 ln(1 + W/n) nats, with the squared Wald statistic W,
-  /// which is robust to errors correlated within blocks, and n blocks from which their variance is estimated, less k/2
-  /// ln(n) for k coefficients (Schwarz 1978). For a rival, W is reduced to the share of the fall of the squared error
-  /// of held-out blocks that it keeps.
+  /// Logarithm of the odds over the best explanation without the effect, from evidence::explanations(). Of effects that
+  /// were chosen by hand: n/2 ln(1 + W/n) nats, with the squared Wald statistic W, which is robust to errors correlated
+  /// within blocks, and n blocks from which their variance is estimated, less k/2 ln(n) for k coefficients (Schwarz
+  /// 1978).
   double evidence_bits = 0;
   Support support;
   std::vector<Rival> rivals;
-  /// Range of each coefficient over fits without a fold, and with a rival added.
+  /// Range of each coefficient over fits without a fold.
   std::vector<Interval> model_form;
 
   std::vector<std::string> confounded_with() const;

@@ -61,12 +61,6 @@ std::vector<Missing> ranking_of(const Passes& passes, const Selected& selected) 
   std::vector<Finding> known = findings(Selection(selected.grams), selected.members);
   std::vector<Missing> ranking;
   for (std::size_t i = 0; i < known.size(); ++i) {
-    const std::string& name = selected.refined[i].candidate.name;
-    const std::vector<std::string> rivals = known[i].confounded_with();
-    const bool has_substitute = !selected.instead.empty() && (is_scale(name) || is_push(name));
-    if (has_substitute && name != selected.instead &&
-        std::find(rivals.begin(), rivals.end(), selected.instead) == rivals.end())
-      known[i].rivals.push_back({selected.instead, stability::effect_info(selected.instead).excitation});
     ranking.push_back(missing_of(passes, selected.refined[i], std::move(known[i]), selected.grams));
     if (!selected.checks.empty()) set_instrument(selected.refined[i], selected.checks[i], ranking.back());
   }

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "analysis/identification/closed_loop.h"
 #include "analysis/identification/findings.h"
 #include "analysis/identification/refinement.h"
+#include "analysis/identification/selected.h"
 
 namespace swarmcert::identification {
 

@@ -1,4 +1,4 @@
-/// @file Selects the effects that explain a residual: forward selection with swaps and removals, by cross-validation.
+/// @file Whether held-out blocks confirm an effect, by cross-validation.
 #pragma once
 
 #include "analysis/identification/cross_validation.h"
@@ -11,8 +11,6 @@ struct Thresholds {
   double paired_z = 3;  ///< paired over blocks; or
   double wald_z = 3.5;  ///< cluster-robust, together with
   double least_paired_z = 1;
-  double swap_gain = 0.003;
-  double removal_share = 0.7;  ///< fraction of `gain`: an effect whose removal costs less is removed
   std::size_t support_records = 100, support_blocks = 5;
   /// Fewer blocks are sufficient for an effect that reduces the mean square of held-out blocks by this much, because
   /// that is a successful prediction.
@@ -26,23 +24,14 @@ struct Thresholds {
 bool is_supported(const Grams& grams, std::size_t candidate, std::size_t theta, std::size_t blocks,
                   const Thresholds& thresholds);
 
-/// The passes over candidates, based on the fits of CrossValidation.
+/// Tests of effects beside others, based on the fits of CrossValidation.
 class Selection : public CrossValidation {
  public:
   /// @param grams must outlive this object
   explicit Selection(const Grams& grams, Thresholds thresholds = {})
       : CrossValidation(grams), thresholds_(thresholds) {}
 
-  /// Runs forward, swap and backward passes and returns the effects ordered().
-  /// @param names effects to begin with, already known
-  Members select(const std::vector<std::string>& names = {}) const;
-  /// Takes one step forward from `members`. Returns false if there is nothing to add.
-  bool add_one(Members& members) const;
-  /// Removes effects that have become unnecessary.
-  void prune(Members& members) const;
-  /// Sorts the effects by how much they reduce the error. An effect that acts only in some places comes before those
-  /// that act everywhere, which can be an artefact of a wrong calibration, if it reduces the error by at least a
-  /// quarter as much.
+  /// Sorts the effects such that each reduces the error more than the next would in its place.
   Members ordered(Members members) const;
   /// Returns the best theta of `candidate` beside `members`.
   Member best_theta(const Members& members, int candidate) const;
@@ -58,24 +47,13 @@ class Selection : public CrossValidation {
   bool is_acceptable(const Members& before, const Member& added, double before_square, double after_square,
                      const Folds& folds) const;
   std::vector<double> errors(const Members& members, const Folds& folds, bool trims) const;
-  /// Returns the candidate to which `candidate` reduces if the quantity it varies with is constant; -1: none.
-  int plain_form(int candidate) const;
   /// Returns the index of the plain candidate of a family; -1 without one.
   int plain_of(stability::Family family) const;
   /// For an effect that only changes within flights show: returns whether it reduces the error of held-out blocks about
   /// the mean of each track, beside a thrust scale.
   bool is_shown_within_flights(const Members& before, const Member& added) const;
-  /// Returns whether held-out blocks prefer `after` by two standard errors and by the gain required of an effect.
-  bool is_clearly_better(const Members& after, const Members& before) const;
-  /// Returns true for a formula of the scan (scan/formulas.h), which represents effects without a name.
-  bool is_formula(const Member& member) const;
-  /// Returns whether a formula replaces a named effect: it explains more by an eighth or leaves less by a fifth, and
-  /// held-out blocks clearly prefer it.
-  bool formula_wins(const Members& rest, const Member& formula, const Member& named) const;
   /// Returns whether the last member is a lag or delay whose gain is at a bound.
   bool is_held(const Members& members) const;
-  bool swap_one(Members& members) const;
-  bool remove_one(Members& members) const;
 
   const Thresholds thresholds_;
 };

@@ -148,41 +148,6 @@ TEST(TellingBlocks, AreAsManyAsCarryTheColumn) {
   EXPECT_FALSE(is_supported(grams, 0, 0, 5, {}));
 }
 
-TEST(Selection, RanksByDropAndLetsLocalEffectsGoFirstOnlyWhereTheyExplainMuch) {
-  const WhiteNoise noise;
-  std::mt19937_64 random(5);
-  std::normal_distribution<double> bell;
-  std::vector<Eigen::VectorXd> other;
-  for (const Eigen::VectorXd& column : noise.column)
-    other.push_back(Eigen::VectorXd::NullaryExpr(column.size(), [&]() { return bell(random); }));
-  const auto first = [&](double local_size) {
-    Grams grams = noise.grams(0.02);
-    Candidate ground = noise.candidate;
-    ground.name = ground.spec.name = "ground";
-    ground.info = stability::effect_info("ground");
-    ground.thetas = {{0.03, 0.06}};
-    grams.candidates.push_back(ground);
-    grams.first_column.push_back({1});
-    grams.support.push_back({{10'000, 40, 1}});
-    grams.columns = 2;
-    for (std::size_t k = 0; k < grams.blocks.size(); ++k) {
-      const Eigen::VectorXd& x = noise.column[k];
-      const Eigen::VectorXd r = noise.residual[k] + 0.02 * x + local_size * other[k];
-      Block& block = grams.blocks[k];
-      block.gram = Eigen::Vector3d(x.squaredNorm(), x.dot(other[k]), other[k].squaredNorm());
-      block.b = Eigen::Vector2d(x.dot(r), other[k].dot(r));
-      block.y = r.squaredNorm();
-    }
-    const Selection selection(grams);
-    const Members members = selection.ordered({{0, 0}, {1, 0}});
-    return selection.candidate(members[0]).name;
-  };
-  // Energies: 0.02^2 for the drag, local_size^2 for the ground.
-  EXPECT_EQ(first(0.001), "drag_linear");
-  EXPECT_EQ(first(0.008), "drag_linear");
-  EXPECT_EQ(first(0.013), "ground") << "less than drag, but more than a quarter of it";
-}
-
 TEST(Jackknife, IsTheVarianceOfWhiteNoiseAndKnowsWhenFewBlocksTell) {
   const WhiteNoise noise;
   Grams grams = noise.grams(0);

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "analysis/identification/evidence/explanations.h"
+#include "analysis/identification/diagnose.h"
 #include "analysis/identification/evidence/noise_model.h"
 #include "analysis/run.h"
 #include "data.h"
@@ -40,8 +40,8 @@ std::vector<float> gust(double tau_s, double white, unsigned seed) {
   return series;
 }
 
-/// Flies `truth` three times and returns what evidence names.
-std::vector<evidence::Named> named_in(const Truth& truth) {
+/// Flies `truth` three times and returns what is named.
+std::vector<identification::Missing> named_in(const Truth& truth) {
   const ScratchFolder folder;
   for (int run = 0; run < 3; ++run)
     fly(truth, {Program::kRich, 1, 30, 4100 + static_cast<std::uint64_t>(run)}, folder.path(), run);
@@ -49,7 +49,9 @@ std::vector<evidence::Named> named_in(const Truth& truth) {
   arguments.models = {source_path("stability/models/crazyflie-small.toml")};
   arguments.flights = {folder.path()};
   const residuals::Inputs inputs = residuals::read_inputs(arguments);
-  return evidence::explanations(inputs, inputs.models[0].kind, 2).effects;
+  return identification::diagnose(inputs, inputs.models[0].kind, identification::every_flight(inputs), 2,
+                                  [](int, int) {})
+      .ranking;
 }
 
 TEST(Evidence, ProductsOfTransformsAreThoseOfTheSeriesFadedAtBothEnds) {
@@ -108,8 +110,8 @@ TEST(Evidence, NamesNothingInAGustAlone) {
   Truth truth;
   truth.gust_N = 0.02;
   truth.gust_time_s = 0.7;
-  for (const evidence::Named& effect : named_in(truth))
-    ADD_FAILURE() << effect.candidate.name << " is not there";
+  for (const identification::Missing& missing : named_in(truth))
+    ADD_FAILURE() << missing.effect << " is not there";
 }
 
 TEST(Evidence, NamesADragInAGustWithItsValueAndAThrustScaleBesideItAmongWhatFlightsCannotTellApart) {
@@ -118,18 +120,19 @@ TEST(Evidence, NamesADragInAGustWithItsValueAndAThrustScaleBesideItAmongWhatFlig
   truth.gust_time_s = 0.7;
   truth.thrust_factor = 1.08;
   truth.force_N = [](const Moment& now) { return Eigen::Vector3d(-0.02 * now.v_m_s); };
-  const std::vector<evidence::Named> named = named_in(truth);
+  const std::vector<identification::Missing> named = named_in(truth);
   std::string all;
-  for (const evidence::Named& effect : named) all += effect.candidate.name + " ";
+  for (const identification::Missing& missing : named) all += missing.effect + " ";
   ASSERT_EQ(named.size(), 2u) << all;
-  for (const evidence::Named& effect : named) {
-    if (effect.candidate.name == "drag_linear") {
-      EXPECT_LT(std::abs(effect.value - 0.02), 3 * effect.deviation) << effect.value;
-      EXPECT_LT(effect.deviation, 0.005);
+  for (const identification::Missing& missing : named) {
+    if (missing.effect == "drag_linear") {
+      const Interval& interval = missing.intervals.at("drag_N_s_m");
+      EXPECT_LT(interval.lower, 0.02);
+      EXPECT_GT(interval.upper, 0.02);
     } else {
-      EXPECT_TRUE(effect.candidate.name == "thrust_ratio" ||
-                  std::any_of(effect.rivals.begin(), effect.rivals.end(),
-                              [](const auto& rival) { return rival.effect == "thrust_ratio"; }))
+      const std::vector<std::string> others = missing.finding.confounded_with();
+      EXPECT_TRUE(missing.effect == "thrust_ratio" ||
+                  std::find(others.begin(), others.end(), "thrust_ratio") != others.end())
           << all;
     }
   }

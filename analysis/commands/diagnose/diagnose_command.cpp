@@ -189,9 +189,9 @@ int run_diagnose(const DiagnoseOptions& options, const CommonOptions& common) {
 Command diagnose_command() {
   return {
       "diagnose", "Find the physical effect that a model lacks, from flights",
-      "Every known effect is a candidate; one counts as found if it lowers the cross-validated error by "
-      "2 %,\n"
-      "is significant across blocks of 2 s, and is not contradicted by the set points. The remainder is "
+      "Every known effect and free curves compete in sets; one counts as found if the best set gains odds "
+      "of\n"
+      "128 : 1 by it. With set points, what a controller answers to a gust is no evidence. The remainder is\n"
       "analysed separately. Means over a second show a centre of mass off the centre and an "
       "accelerometer\n"
       "that reads too much. Logs with the set points, path, sensors, name or kind of another vehicle are "

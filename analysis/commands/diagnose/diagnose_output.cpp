@@ -47,19 +47,14 @@ std::string varies_with(const Diagnosis& diagnosis) {
 
 std::vector<std::string> left_sentences(const Diagnosis& diagnosis, const residuals::ForceUnit& unit) {
   std::vector<std::string> sentences;
-  for (const std::string& effect : diagnosis.contradicted)
-    sentences.push_back(
-        fmt::format("Not counted: {} fits, but not along the set points: it is the controller's response to "
-                    "something else.",
-                    effect));
   for (const std::string& effect : diagnosis.suspected) {
     const std::vector<std::string>& at_bound = diagnosis.at_bound;
     sentences.push_back(
         fmt::format("Not counted: {} {}.", effect,
                     std::find(at_bound.begin(), at_bound.end(), effect) != at_bound.end()
                         ? "ends at its bound: not identified"
-                        : "fits, but explains little of the remainder, another form explains more, or set "
-                          "points do not confirm it"));
+                        : "fits, but another form explains more, or it does not lower the error of held-out "
+                          "blocks"));
   }
   if (diagnosis.thrust_scale.is_known) {
     const identification::InstrumentedValue& scale = diagnosis.thrust_scale.value;

@@ -103,7 +103,6 @@ void describe_kind(Record& record, const Diagnosis& diagnosis) {
   record.field("rmse_after", diagnosis.rmse_after_N, "Of held-out blocks, with what is named.", "N",
                "estimate");
   record.field("too_poor", diagnosis.too_poor, "Why there is no answer; empty if there is one.");
-  record.field("closed_loop_artefacts", diagnosis.contradicted, "They fit, but set points contradict them.");
   record.field("suspected", diagnosis.suspected, "They fit, but are not named.");
   record.field("at_bound", diagnosis.at_bound, "Of those: a value ended at its bound.");
   const ThrustScale& scale = diagnosis.thrust_scale;

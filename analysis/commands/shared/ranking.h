@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "analysis/commands/shared/effect_output.h"
-#include "analysis/identification/closed_loop.h"
+#include "analysis/identification/selected.h"
 #include "analysis/identification/verdict.h"
 #include "nn/base/record.h"
 

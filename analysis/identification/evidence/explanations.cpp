@@ -4,7 +4,6 @@
 #include <cmath>
 #include <set>
 
-#include "analysis/identification/diagnose.h"
 #include "analysis/identification/evidence/evidence_search.h"
 #include "analysis/identification/evidence/projection.h"
 #include "analysis/identification/evidence/shapes.h"
@@ -71,16 +70,26 @@ double lost_in_world(const EvidenceSearch& search, const Weighed& best, std::siz
   return (best.score - search.weigh(in_world.set).score) / std::log(2.0);
 }
 
-/// Returns whether the form of the effect at `index` lacks a tenth of its evidence: a curve over its own variable has
-/// it, or only what turns with the body explains the flights.
+/// Returns the bits that the set loses without two of its items.
+double bits_of_both(const EvidenceSearch& search, const Weighed& best, std::size_t a, std::size_t b) {
+  Set rest;
+  for (std::size_t i = 0; i < best.set.size(); ++i) {
+    if (i != a && i != b) rest.push_back(best.set[i]);
+  }
+  return (best.score - search.weigh(rest).score) / std::log(2.0);
+}
+
+/// Returns whether the effect at `index` has another form than the flights show: a tenth of the evidence for it is for a
+/// curve over its own variable beside it, or is only for what turns with the body.
 bool is_refuted(const Hypotheses& all, const EvidenceSearch& search, const Weighed& best, std::size_t index) {
-  constexpr double kOfEffect = 0.1;
+  constexpr double kShare = 0.1;
   const stability::EffectTraits& traits = all.candidates[best.set[index].entry].info.traits;
-  const double least_bits = kOfEffect * search.bits(best, index);
-  if (traits.may_turn_with_body && lost_in_world(search, best, index) > least_bits) return true;
+  if (traits.may_turn_with_body && lost_in_world(search, best, index) > kShare * search.bits(best, index))
+    return true;
   for (std::size_t i = 0; i < best.set.size(); ++i) {
     const Entry& entry = all.entries[best.set[i].entry];
-    if (entry.kind == Kind::kCurve && traits.varies_with(entry.variable) && search.bits(best, i) > least_bits)
+    if (entry.kind == Kind::kCurve && traits.varies_with(entry.variable) &&
+        search.bits(best, i) > kShare * bits_of_both(search, best, index, i))
       return true;
   }
   return false;
@@ -130,6 +139,7 @@ Explanations described(const Hypotheses& all, const Found& found) {
       result.effects.push_back(named(all, search, found.best, i, first));
     else
       result.curves.push_back(entry.name);
+    if (entry.name == kDragCurve) result.has_drag_curve = true;
     first += entry.size;
   }
   std::stable_sort(result.effects.begin(), result.effects.end(),
@@ -146,14 +156,6 @@ Explanations explanations(const identification::Passes& passes, Hypotheses& all)
     if (names.empty()) return described(all, found);
     all.excluded.insert(names.begin(), names.end());
   }
-}
-
-Explanations explanations(const residuals::Inputs& inputs, const std::string& kind, int jobs) {
-  const std::vector<int> flights = identification::every_flight(inputs);
-  const identification::Coverage covered = identification::coverage(inputs, kind, flights, jobs);
-  const identification::Passes passes = {inputs, kind, flights, covered.records, jobs, [](int, int) {}};
-  Hypotheses all = hypotheses(passes, identification::all_candidates(*inputs.model_of(kind), covered));
-  return explanations(passes, all);
 }
 
 }  // namespace swarmcert::evidence

@@ -20,6 +20,7 @@ struct Named {
 struct Explanations {
   std::vector<Named> effects;       ///< in the order of their evidence
   std::vector<std::string> curves;  ///< free curves beside them: "force_z over z"
+  bool has_drag_curve = false;      ///< one of them is a force against the velocity
   /// The data are what set points can have caused. Otherwise a log has none, and the answer of a controller to a
   /// disturbance may look like an effect of thrust or velocity.
   bool is_by_set_points = false;
@@ -30,7 +31,5 @@ struct Explanations {
 /// body, has a tenth. The deviations hold for the shape of the single theta.
 /// @param all of these flights; shapes off the grid are added, and refuted effects excluded
 Explanations explanations(const identification::Passes& passes, Hypotheses& all);
-/// Likewise of all flights of `inputs` by vehicles of `kind`, for all candidates.
-Explanations explanations(const residuals::Inputs& inputs, const std::string& kind, int jobs);
 
 }  // namespace swarmcert::evidence

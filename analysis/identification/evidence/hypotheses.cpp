@@ -109,7 +109,7 @@ Entry entry_of(const CurveOver& over, int first_column, double weight_N) {
       entry.name = fmt::format("force_b{} over {}", over.axis + 1, variable);
       break;
     case Frame::kVelocity:
-      entry.name = "drag over " + variable;
+      entry.name = kDragCurve;
       break;
   }
   entry.kind = Kind::kCurve;

@@ -18,6 +18,9 @@ enum class Kind {
   kCurve  ///< a free curve over a variable, along one axis
 };
 
+/// The name of the free curve along the velocity over the speed.
+inline constexpr char kDragCurve[] = "drag over speed";
+
 /// A normal distribution of coefficients.
 struct Prior {
   Eigen::VectorXd mean;
