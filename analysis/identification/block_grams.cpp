@@ -11,12 +11,10 @@ namespace {
 /// Adds all candidates along a track, block by block.
 void add_track(const Passes& passes, const ModelledTrack& track, const Grams& grams, const Noise* noise,
                int flight, FlightPart& part) {
-  const int number = part.tracks++;
   run_blocks(passes.inputs, track, grams, noise, part.support, [&](int at, const Eigen::MatrixXd& rows) {
     part.blocks.push_back(condensed(rows));
     Block& block = part.blocks.back();
     block.flight = flight;
-    block.track = number;
     block.follows = track.cut.blocks[static_cast<std::size_t>(at)].follows;
   });
 }
@@ -35,19 +33,6 @@ Grams made_anew(const Passes& passes, std::vector<Candidate> candidates, const N
 }
 
 }  // namespace
-
-double telling_blocks(const Grams& grams, std::size_t candidate, std::size_t theta) {
-  const int first = grams.first_column[candidate][theta];
-  double sum = 0, squares = 0;
-  for (const Block& block : grams.blocks) {
-    double energy = 0;
-    for (int c = 0; c < grams.candidates[candidate].columns(); ++c)
-      energy += block.gram[Grams::packed(first + c, first + c)];
-    sum += energy;
-    squares += energy * energy;
-  }
-  return squares > 0 ? sum * sum / squares : 0;
-}
 
 Eigen::VectorXd part_of(const Eigen::VectorXd& all, const std::vector<int>& columns) {
   Eigen::VectorXd part(static_cast<Eigen::Index>(columns.size()));

@@ -21,10 +21,8 @@ struct Block {
   Eigen::VectorXd b;
   double y = 0;
   int records = 0;
-  int flight = 0;              ///< index into Inputs::found.flights
-  int track = 0;               ///< counts the vehicles of all flights
-  Eigen::Matrix3Xd sums = {};  ///< [3 x columns + 1]: of the columns and of the residual, over the records
-  bool follows = false;        ///< directly follows the previous block of the same vehicle
+  int flight = 0;        ///< index into Inputs::found.flights
+  bool follows = false;  ///< directly follows the previous block of the same vehicle
 };
 
 /// Support of a candidate with one theta: where the effect would act if it existed.
@@ -46,10 +44,6 @@ struct Grams {
     return i <= j ? Eigen::Index(j) * (j + 1) / 2 + i : packed(j, i);
   }
 };
-
-/// Returns the effective number of blocks for a candidate's coefficients (Kish): (sum h)^2 / sum h^2, where h is the
-/// energy of its columns in each block.
-double telling_blocks(const Grams& grams, std::size_t candidate, std::size_t theta);
 
 /// Selects rows and columns `columns` of a packed Gram matrix, and elements `columns` of a vector.
 Eigen::MatrixXd part_of_gram(const Eigen::VectorXd& packed, const std::vector<int>& columns);

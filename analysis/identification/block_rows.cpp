@@ -118,8 +118,6 @@ Block condensed(const Eigen::Ref<const Eigen::MatrixXd>& rows) {
   block.b = x.transpose() * rows.col(columns);
   block.y = rows.col(columns).squaredNorm();
   block.records = static_cast<int>(rows.rows() / 3);
-  block.sums = Eigen::Matrix3Xd::Zero(3, rows.cols());
-  for (int i = 0; i < block.records; ++i) block.sums += rows.middleRows<3>(Eigen::Index(3) * i);
   return block;
 }
 
@@ -129,13 +127,8 @@ FlightPart::FlightPart(const Grams& grams) {
 }
 
 Grams joined(Grams grams, std::vector<FlightPart> parts) {
-  int tracks = 0;
   for (FlightPart& part : parts) {
-    for (Block& block : part.blocks) {
-      block.track += tracks;
-      grams.blocks.push_back(std::move(block));
-    }
-    tracks += part.tracks;
+    for (Block& block : part.blocks) grams.blocks.push_back(std::move(block));
     std::size_t index = 0;
     for (auto& thetas : grams.support) {
       for (Support& support : thetas) {

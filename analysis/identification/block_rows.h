@@ -27,16 +27,15 @@ Eigen::MatrixXd columns_along(const residuals::Inputs& inputs, const ModelledTra
 /// Returns the residual in the same form, in newton.
 Eigen::VectorXd residual_along(const ModelledTrack& modelled);
 
-/// Returns the Gram matrix, products and sums of a block.
+/// Returns the Gram matrix and the products of a block.
 /// @param rows as passed by run_blocks()
 Block condensed(const Eigen::Ref<const Eigen::MatrixXd>& rows);
 
 /// The part of Grams of one flight.
 struct FlightPart {
   explicit FlightPart(const Grams& grams);
-  std::vector<Block> blocks;  ///< Block::track counts the tracks of this flight
+  std::vector<Block> blocks;
   std::vector<Support> support;
-  int tracks = 0;
 };
 
 /// Returns `grams` with the blocks and the support of all flights.

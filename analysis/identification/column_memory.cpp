@@ -41,7 +41,6 @@ Block gathered(const KeptBlock& kept, const std::vector<int>& source) {
   Block block;
   block.gram = Eigen::VectorXd::Zero(n * (n + 1) / 2);
   block.b = Eigen::VectorXd::Zero(n);
-  block.sums = Eigen::Matrix3Xd::Zero(3, n + 1);
   double* to = block.gram.data();
   for (std::size_t j = 0; j < source.size(); to += ++j) {
     if (source[j] < 0) continue;
@@ -58,9 +57,7 @@ Block gathered(const KeptBlock& kept, const std::vector<int>& source) {
       i = end;
     }
     block.b[static_cast<Eigen::Index>(j)] = kept.b[static_cast<std::size_t>(source[j])];
-    block.sums.col(static_cast<Eigen::Index>(j)) = kept.sums[static_cast<std::size_t>(source[j])];
   }
-  block.sums.col(n) = kept.residual_sum_N;
   block.y = kept.y;
   return block;
 }
@@ -88,8 +85,6 @@ KeptTrack kept_track(ModelledTrack track) {
     const Eigen::VectorXd r = kept.residual_N.segment(block.first_row, Eigen::Index(3) * block.records);
     kept.blocks.emplace_back();
     kept.blocks.back().y = r.squaredNorm();
-    for (int i = 0; i < block.records; ++i)
-      kept.blocks.back().residual_sum_N += r.segment<3>(Eigen::Index(3) * i);
   }
   kept.known = std::move(track);
   return kept;
@@ -118,7 +113,6 @@ void append(Eigen::MatrixXd fresh, KeptTrack& track) {
       const double* const column = products.col(j).data();
       block.gram.insert(block.gram.end(), column, column + known + j + 1);
       block.b.push_back(b[j]);
-      block.sums.emplace_back(x.col(j).reshaped(3, cut.records).rowwise().sum());
     }
   }
   track.pieces.push_back(std::move(fresh));
@@ -250,7 +244,7 @@ void ColumnMemory::forget_kept() {
     for (KeptTrack& track : flight.tracks) {
       track.support.clear();
       track.pieces = {};
-      for (KeptBlock& block : track.blocks) block = {block.y, block.residual_sum_N, {}, {}, {}};
+      for (KeptBlock& block : track.blocks) block = {block.y, {}, {}};
     }
   }
 }
@@ -328,7 +322,6 @@ void ColumnMemory::add_track(const Passes& passes, const Grams& asked, const Req
     columns.push_back(track.residual_N.data());
     rows = assembled(length, columns, source);
   }
-  const int number = part.tracks++;
   for (std::size_t b = 0; b < track.blocks.size(); ++b) {
     const TrackBlock& cut = track.known.cut.blocks[b];
     part.blocks.push_back(has_all ? gathered(track.blocks[b], source)
@@ -336,7 +329,6 @@ void ColumnMemory::add_track(const Passes& passes, const Grams& asked, const Req
     Block& block = part.blocks.back();
     block.records = cut.records;
     block.flight = passes.flights[at.flight];
-    block.track = number;
     block.follows = cut.follows;
   }
   std::size_t stream = 0;

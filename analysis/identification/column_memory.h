@@ -25,11 +25,9 @@ std::string text_of(const std::vector<Candidate>& candidates);
 
 /// A block of a track with the kept columns X and the residual r.
 struct KeptBlock {
-  double y = 0;  ///< r'r
-  Eigen::Vector3d residual_sum_N = Eigen::Vector3d::Zero();
-  std::vector<double> gram;           ///< X'X, packed as Block::gram
-  std::vector<double> b;              ///< X'r
-  std::vector<Eigen::Vector3d> sums;  ///< of each column, over the records
+  double y = 0;              ///< r'r
+  std::vector<double> gram;  ///< X'X, packed as Block::gram
+  std::vector<double> b;     ///< X'r
 };
 
 /// The columns of one effect with one theta.

@@ -98,12 +98,6 @@ std::vector<int> CrossValidation::columns(const Members& members) const {
   return all;
 }
 
-bool CrossValidation::is_present(const Members& members, int which) const {
-  const std::string& name = grams_.candidates[static_cast<std::size_t>(which)].name;
-  return std::any_of(members.begin(), members.end(),
-                     [&](const Member& m) { return candidate(m).name == name; });
-}
-
 Eigen::VectorXd CrossValidation::solve(const Sum& sum, const Members& members) const {
   const std::vector<int> all = columns(members);
   Eigen::VectorXd lower(static_cast<Eigen::Index>(all.size())), upper = lower;
@@ -151,17 +145,7 @@ std::vector<Eigen::VectorXd> CrossValidation::fold_coefficients(const Members& m
 }
 
 double CrossValidation::mean_square(const Members& members) const {
-  return mean_square(members, folds_for(members));
-}
-
-double CrossValidation::mean_square(const Members& members, const Folds& folds) const {
-  const Question question(&folds == &by_flight_, members);
-  const auto known = mean_squares_.find(question);
-  if (known != mean_squares_.end()) return known->second;
-  return mean_squares_.emplace(question, made_mean_square(members, folds)).first->second;
-}
-
-double CrossValidation::made_mean_square(const Members& members, const Folds& folds) const {
+  const Folds& folds = folds_for(members);
   const std::vector<int> all = columns(members);
   double error = 0;
   for (std::size_t f = 0; f < kFolds; ++f) {
@@ -174,17 +158,7 @@ double CrossValidation::made_mean_square(const Members& members, const Folds& fo
 }
 
 std::vector<double> CrossValidation::block_errors(const Members& members) const {
-  return block_errors(members, folds_for(members));
-}
-
-const std::vector<double>& CrossValidation::block_errors(const Members& members, const Folds& folds) const {
-  const Question question(&folds == &by_flight_, members);
-  const auto known = block_errors_.find(question);
-  if (known != block_errors_.end()) return known->second;
-  return block_errors_.emplace(question, made_block_errors(members, folds)).first->second;
-}
-
-std::vector<double> CrossValidation::made_block_errors(const Members& members, const Folds& folds) const {
+  const Folds& folds = folds_for(members);
   const std::vector<int> all = columns(members);
   std::array<Eigen::VectorXd, kFolds> fits;
   for (std::size_t f = 0; f < kFolds && !all.empty(); ++f) fits[f] = solve(folds.outside[f], members);
@@ -201,35 +175,45 @@ std::vector<double> CrossValidation::made_block_errors(const Members& members, c
   return errors;
 }
 
-std::vector<double> CrossValidation::trimmed_errors(const Members& members, const Folds& folds) const {
-  const std::vector<int> all = columns(members);
-  std::array<Eigen::VectorXd, kFolds> fits;
-  for (std::size_t f = 0; f < kFolds && !all.empty(); ++f) fits[f] = solve(folds.outside[f], members);
-  const auto left_sum = [&](const Block& block, std::size_t fold) {
-    Eigen::Vector3d sum = block.sums.rightCols<1>();
-    for (std::size_t k = 0; k < all.size(); ++k)
-      sum -= fits[fold][static_cast<Eigen::Index>(k)] * block.sums.col(all[k]);
-    return sum;
-  };
-  std::vector<double> errors = block_errors(members, folds);
-  const std::vector<Block>& blocks = grams_.blocks;
-  for (std::size_t first = 0, end = 0; first < blocks.size(); first = end) {
-    std::array<Eigen::Vector3d, kFolds> mean;
-    mean.fill(Eigen::Vector3d::Zero());
-    double records = 0;
-    for (end = first; end < blocks.size() && blocks[end].track == blocks[first].track; ++end) {
-      if (blocks[end].sums.size() == 0) return errors;
-      records += blocks[end].records;
-      for (std::size_t f = 0; f < kFolds; ++f) mean[f] += left_sum(blocks[end], f);
-    }
-    for (std::size_t i = first; i < end; ++i) {
-      const auto fold = static_cast<std::size_t>(folds.of_block[i]);
-      const Eigen::Vector3d trim = mean[fold] / records;
-      errors[i] = std::max(
-          errors[i] - 2 * trim.dot(left_sum(blocks[i], fold)) + blocks[i].records * trim.squaredNorm(), 0.0);
+Members CrossValidation::ordered(Members members) const {
+  Members result;
+  while (!members.empty()) {
+    std::vector<double> squares;
+    for (const Member& member : members) squares.push_back(mean_square(with(result, member)));
+    const auto best =
+        static_cast<std::size_t>(std::min_element(squares.begin(), squares.end()) - squares.begin());
+    result.push_back(members[best]);
+    members = without(members, best);
+  }
+  return result;
+}
+
+bool CrossValidation::is_held(const Members& members) const {
+  if (!candidate(members.back()).info.remembers) return false;
+  const Eigen::VectorXd c = in_model(members, coefficients(members));
+  return std::abs(c[c.size() - 1] - 1) > 0.999 * kMemoryTolerance;
+}
+
+Member CrossValidation::best_theta(const Members& members, int which) const {
+  Member best{which, 0};
+  double least = kInfinity;
+  bool best_is_held = true;
+  const auto thetas = static_cast<int>(grams().candidates[static_cast<std::size_t>(which)].thetas.size());
+  for (int t = 0; t < thetas; ++t) {
+    const Member member{which, t};
+    const Members after = with(members, member);
+    // A neighbouring theta of a coarse grid may fit better with a gain at its bound, but that is not a lag.
+    const bool held = is_held(after);
+    if (held && !best_is_held) continue;
+    const double square = mean_square(after);
+    // Of thetas that differ only by round-off, use the first, which is the default.
+    if (square < least * (1 - 1e-9) || (best_is_held && !held)) {
+      least = square;
+      best = member;
+      best_is_held = held;
     }
   }
-  return errors;
+  return best;
 }
 
 Fit CrossValidation::fit(const Members& members) const {

@@ -2,8 +2,6 @@
 #pragma once
 
 #include <array>
-#include <map>
-#include <utility>
 #include <vector>
 
 #include "analysis/identification/block_grams.h"
@@ -30,8 +28,7 @@ struct Fit {
   Eigen::MatrixXd covariance;  ///< see sandwich()
 };
 
-/// Fits and cross-validates sets of effects. Predictions are cached, because the passes of a selection request the same
-/// ones again. Not thread-safe.
+/// Fits and cross-validates sets of effects.
 class CrossValidation {
  public:
   /// @param grams must outlive this object
@@ -41,6 +38,10 @@ class CrossValidation {
   double mean_square(const Members& members) const;
   /// Returns the cross-validated squared error of each block, N^2.
   std::vector<double> block_errors(const Members& members) const;
+  /// Sorts the effects such that each reduces the error more than the next would in its place.
+  Members ordered(Members members) const;
+  /// Returns the best theta of `candidate` beside `members`.
+  Member best_theta(const Members& members, int candidate) const;
   /// Returns the coefficients of the fits that leave out one fold each.
   std::vector<Eigen::VectorXd> fold_coefficients(const Members& members) const;
   /// Returns the coefficients of the fit to all blocks, within their bounds, as factors of the columns. For a lag or
@@ -61,11 +62,9 @@ class CrossValidation {
   const Support& support(const Member& member) const {
     return grams_.support[static_cast<std::size_t>(member.candidate)][static_cast<std::size_t>(member.theta)];
   }
-  /// Returns true if `members` contains an effect with the name of the candidate.
-  bool is_present(const Members& members, int candidate) const;
   double records() const { return total_.records; }
 
- protected:
+ private:
   static constexpr int kFolds = 5;
   struct Sum {
     Eigen::VectorXd gram, b;
@@ -77,31 +76,20 @@ class CrossValidation {
     std::vector<int> of_block;
     std::array<Sum, kFolds> inside, outside;
   };
+
   const Folds& folds_for(const Members& members) const;
-  double mean_square(const Members& members, const Folds& folds) const;
-  const std::vector<double>& block_errors(const Members& members, const Folds& folds) const;
-  /// Like block_errors(), after subtracting the mean residual of each track, which excludes differences between flights
-  /// such as trims.
-  std::vector<double> trimmed_errors(const Members& members, const Folds& folds) const;
-
- private:
-  /// Key of a prediction: whether whole flights are left out, and the effects.
-  using Question = std::pair<bool, Members>;
-
   void divide(Folds& folds) const;
-  double made_mean_square(const Members& members, const Folds& folds) const;
-  std::vector<double> made_block_errors(const Members& members, const Folds& folds) const;
   std::vector<int> columns(const Members& members) const;
   Eigen::VectorXd solve(const Sum& sum, const Members& members) const;
   /// Returns T with c = T c_model: ones on the diagonal, and couplings between a stage of the thrust and its scale.
   Eigen::MatrixXd from_model(const Members& members) const;
+  /// Returns whether the last member is a lag or delay whose gain is at a bound.
+  bool is_held(const Members& members) const;
 
   const Grams& grams_;
   Folds random_, by_flight_;
   bool has_flights_ = false;
   Sum total_;
-  mutable std::map<Question, double> mean_squares_;
-  mutable std::map<Question, std::vector<double>> block_errors_;
 };
 
 }  // namespace swarmcert::identification

@@ -130,23 +130,18 @@ Diagnosis diagnose(const residuals::Inputs& inputs, const std::string& kind, con
   const Passes all = is_excerpt ? Passes{whole, kind, which, covered.records, jobs, progress} : passes;
   Settled& settled = explained.settled;
   const Selected& selected = settled.selected;
-  const Selection selection(selected.grams);
+  const CrossValidation fits(selected.grams);
   result.suspected = std::move(settled.suspected);
   for (const std::string& name : result.suspected) {
     if (settled.at_bound.count(name) == 1) result.at_bound.push_back(name);
   }
-  result.rmse_before_N = std::sqrt(selection.mean_square({}));
+  result.rmse_before_N = std::sqrt(fits.mean_square({}));
   Members named;
   for (const Member& member : selected.members) {
-    if (!is_formula(selection.candidate(member).name)) named.push_back(member);
+    if (!is_formula(fits.candidate(member).name)) named.push_back(member);
   }
-  result.rmse_after_N = std::sqrt(selection.mean_square(named));
-  result.detectable = detectable(selected.grams, named);
-  result.detectable.erase(std::remove_if(result.detectable.begin(), result.detectable.end(),
-                                         [](const Detectable& entry) {
-                                           return is_formula(entry.effect) || needs_scan(entry.effect);
-                                         }),
-                          result.detectable.end());
+  result.rmse_after_N = std::sqrt(fits.mean_square(named));
+  result.detectable = std::move(settled.detectable);
   if (is_excerpt) {
     if (const auto squares = fit_to_all(all, passes, explained)) {
       result.rmse_before_N = std::sqrt(squares->first);
@@ -187,11 +182,11 @@ std::vector<Missing> fit_effects(const residuals::Inputs& inputs, const std::str
   for (const std::string& name : names) candidates.push_back(candidate_to_fit(passes, name, covered, beside));
   Selected selected;
   selected.grams = block_grams(passes, candidates);
-  const Selection selection(selected.grams);
+  const CrossValidation fits(selected.grams);
   for (int round = 0; round < 3; ++round) {
     for (std::size_t i = 0; i < names.size(); ++i) {
       const Members rest = round == 0 ? selected.members : without(selected.members, i);
-      const Member best = selection.best_theta(rest, static_cast<int>(i));
+      const Member best = fits.best_theta(rest, static_cast<int>(i));
       if (round == 0)
         selected.members.push_back(best);
       else

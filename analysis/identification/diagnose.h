@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "analysis/identification/evidence/detectable.h"
 #include "analysis/identification/explanation.h"
-#include "analysis/identification/injection.h"
 
 namespace swarmcert::identification {
 
@@ -25,7 +25,7 @@ struct Diagnosis {
   /// Found, but not named, see explain().
   std::vector<std::string> suspected;
   std::vector<std::string> at_bound;  ///< of those: not identified, because a value ended at its bound
-  std::vector<Detectable> detectable;
+  std::vector<evidence::Detectable> detectable;
   Remainder remainder;
   Scan scan;                      ///< the variables on which the remainder depends
   std::vector<Formula> formulas;  ///< for entries of `scan`, best first

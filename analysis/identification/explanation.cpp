@@ -138,7 +138,7 @@ Selected selected_of(const Passes& passes, std::vector<Candidate> candidates,
   }
   Selected result;
   result.grams = block_grams(passes, std::move(candidates), Kept::kYes);
-  result.members = Selection(result.grams).ordered(members);
+  result.members = CrossValidation(result.grams).ordered(members);
   result.refined = with_innovations(passes, refine(passes, result.grams, result.members));
   result.checks = instrument(passes, candidates_of(result.refined));
   widen_by_bias(result.checks, instrument_with_shapes(passes, result.refined), result.refined);
@@ -147,10 +147,11 @@ Selected selected_of(const Passes& passes, std::vector<Candidate> candidates,
 
 /// Returns the effects without which held-out blocks are predicted better.
 std::set<std::string> unhelpful(const Selected& selected) {
-  const Selection selection(selected.grams);
+  const CrossValidation fits(selected.grams);
   std::set<std::string> names;
   for (std::size_t i = 0; i < selected.members.size(); ++i) {
-    if (selection.loss_without(selected.members, i) < 0) names.insert(selected.refined[i].candidate.name);
+    if (fits.mean_square(selected.members) > fits.mean_square(without(selected.members, i)))
+      names.insert(selected.refined[i].candidate.name);
   }
   return names;
 }
@@ -194,6 +195,7 @@ void settle(const Passes& passes, const std::vector<Candidate>& candidates, Expl
     settled.selected = selected_of(passes, candidates, found);
     settled.ranking = ranking_of(passes, settled.selected);
     set_evidence(found, settled.ranking);
+    settled.detectable = found.detectable;
     result.has_drag_law = found.has_drag_curve;
     result.has_curves = !found.curves.empty();
     doubtful = out_of_bounds(settled.selected);
@@ -201,6 +203,11 @@ void settle(const Passes& passes, const std::vector<Candidate>& candidates, Expl
     doubtful.merge(unhelpful(settled.selected));
     hypotheses.excluded.insert(doubtful.begin(), doubtful.end());
   } while (!doubtful.empty());
+  const auto is_of_scan = [](const auto& entry) {
+    return is_formula(entry.effect) || needs_scan(entry.effect);
+  };
+  settled.detectable.erase(std::remove_if(settled.detectable.begin(), settled.detectable.end(), is_of_scan),
+                           settled.detectable.end());
   settled.suspected.assign(hypotheses.excluded.begin(), hypotheses.excluded.end());
 }
 
@@ -231,8 +238,8 @@ std::optional<std::pair<double, double>> fit_to_all(const Passes& all, const Pas
     candidates.push_back(effect.candidate);
   }
   const Grams grams = block_grams(all, std::move(candidates));
-  const Selection selection(grams);
-  const std::vector<Finding> found = findings(selection, members);
+  const CrossValidation fits(grams);
+  const std::vector<Finding> found = findings(fits, members);
   for (std::size_t i = 0; i < found.size(); ++i) {
     Finding& finding = ranking[i].finding;
     Finding next = found[i];
@@ -243,7 +250,7 @@ std::optional<std::pair<double, double>> fit_to_all(const Passes& all, const Pas
     finding = std::move(next);
   }
   if (!refined.empty()) set_numbers(all, refined, grams, ranking);
-  return std::make_pair(selection.mean_square({}), selection.mean_square(members));
+  return std::make_pair(fits.mean_square({}), fits.mean_square(members));
 }
 
 }  // namespace swarmcert::identification

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "analysis/identification/evidence/detectable.h"
 #include "analysis/identification/missing.h"
 #include "analysis/identification/remainder.h"
 #include "analysis/identification/scan/formulas.h"
@@ -20,6 +21,7 @@ struct Settled {
   std::vector<Missing> ranking;
   Remainder rest;
   std::vector<std::string> suspected;
+  std::vector<evidence::Detectable> detectable;
   std::set<std::string> at_bound;  ///< of those: not identified, because a value ended at its bound
 };
 

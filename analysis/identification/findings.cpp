@@ -53,32 +53,32 @@ std::vector<std::string> Finding::confounded_with() const {
   return names;
 }
 
-std::vector<Finding> findings(const Selection& selection, const Members& members) {
+std::vector<Finding> findings(const CrossValidation& fits, const Members& members) {
   std::vector<Finding> result;
   Members prefix;
   for (std::size_t i = 0; i < members.size(); ++i) {
     Finding finding;
     finding.member = members[i];
-    finding.support = selection.support(members[i]);
-    const std::vector<double> before = selection.block_errors(prefix);
+    finding.support = fits.support(members[i]);
+    const std::vector<double> before = fits.block_errors(prefix);
     prefix.push_back(members[i]);
-    const std::vector<double> after = selection.block_errors(prefix);
-    finding.rmse_before_N = std::sqrt(sum_of(before) / selection.records());
-    finding.rmse_after_N = std::sqrt(sum_of(after) / selection.records());
+    const std::vector<double> after = fits.block_errors(prefix);
+    finding.rmse_before_N = std::sqrt(sum_of(before) / fits.records());
+    finding.rmse_after_N = std::sqrt(sum_of(after) / fits.records());
     finding.drop_interval = drop_interval(before, after);
     const Members rest = without(members, i);
     const Members last = with(rest, members[i]);
-    finding.paired_z = paired_z(selection.block_errors(rest), selection.block_errors(last));
-    finding.wald_z = selection.wald(last);
-    const Eigen::Index p = selection.candidate(members[i]).columns();
-    const std::size_t blocks = selection.grams().blocks.size();
+    finding.paired_z = paired_z(fits.block_errors(rest), fits.block_errors(last));
+    finding.wald_z = fits.wald(last);
+    const Eigen::Index p = fits.candidate(members[i]).columns();
+    const std::size_t blocks = fits.grams().blocks.size();
     finding.evidence_bits = (log_likelihood_ratio(finding.wald_z * finding.wald_z, blocks) -
                              static_cast<double>(p) / 2 * std::log(static_cast<double>(blocks))) /
                             std::log(2.0);
-    const Eigen::VectorXd own = selection.in_model(last, selection.coefficients(last)).tail(p);
+    const Eigen::VectorXd own = fits.in_model(last, fits.coefficients(last)).tail(p);
     for (Eigen::Index c = 0; c < p; ++c) finding.model_form.emplace_back(own[c], own[c]);
-    for (const Eigen::VectorXd& fold : selection.fold_coefficients(last))
-      widen(finding.model_form, selection.in_model(last, fold).tail(p));
+    for (const Eigen::VectorXd& fold : fits.fold_coefficients(last))
+      widen(finding.model_form, fits.in_model(last, fold).tail(p));
     result.push_back(std::move(finding));
   }
   return result;

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "analysis/identification/selection.h"
+#include "analysis/identification/cross_validation.h"
 #include "nn/base/interval.h"
 
 namespace swarmcert::identification {
@@ -42,6 +42,6 @@ struct Finding {
 
 /// Returns the findings.
 /// @param members in ranking order
-std::vector<Finding> findings(const Selection& selection, const Members& members);
+std::vector<Finding> findings(const CrossValidation& fits, const Members& members);
 
 }  // namespace swarmcert::identification

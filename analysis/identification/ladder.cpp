@@ -24,8 +24,7 @@ using stability::LadderRow;
 constexpr double kLeastFall = 0.005;
 constexpr char kImbalance[] = "imbalance of the rotors";
 constexpr char kRatesAhead[] = "error of body rates up to half a second ahead";
-/// Of formulas and shapes, which are chosen among many: as of the mean square of an effect that counts as found.
-constexpr double kLeastFallOfForm = Thresholds{}.gain / 2;
+constexpr double kLeastFallOfForm = 0.01;  ///< of formulas and shapes, which are chosen among many
 
 int looks_so_far(const stability::Model& model) {
   int looks = 0;

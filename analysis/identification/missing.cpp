@@ -58,7 +58,7 @@ void set_instrument(const Refined& refined, const std::vector<InstrumentedValue>
 }
 
 std::vector<Missing> ranking_of(const Passes& passes, const Selected& selected) {
-  std::vector<Finding> known = findings(Selection(selected.grams), selected.members);
+  std::vector<Finding> known = findings(CrossValidation(selected.grams), selected.members);
   std::vector<Missing> ranking;
   for (std::size_t i = 0; i < known.size(); ++i) {
     ranking.push_back(missing_of(passes, selected.refined[i], std::move(known[i]), selected.grams));

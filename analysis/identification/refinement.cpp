@@ -121,8 +121,8 @@ class Refinement {
         noise_ == nullptr ? block_grams(passes_, around) : whitened_grams(passes_, around, *noise_);
     Members members;
     for (int m = 0; m < static_cast<int>(around.size()); ++m) members.push_back({m, 0});
-    const Selection selection(full);
-    const Eigen::VectorXd c = selection.coefficients(members), in_model = selection.in_model(members, c);
+    const CrossValidation fits(full);
+    const Eigen::VectorXd c = fits.coefficients(members), in_model = fits.in_model(members, c);
     Point point;
     point.thetas = thetas;
     const Eigen::MatrixXd mix = mixing(full, around, widths, c, in_model, point);

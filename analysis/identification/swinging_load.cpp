@@ -4,8 +4,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "analysis/identification/cross_validation.h"
 #include "analysis/identification/remainder.h"
-#include "analysis/identification/selection.h"
 #include "stability/effects/registry.h"
 
 namespace swarmcert::identification {
@@ -65,11 +65,6 @@ class PendulumSearch {
     }
   }
 
-  bool is_acceptable() const {
-    const Selection selection(grams_);
-    return selection.is_sound() && selection.is_acceptable(kFixedLoad, member_);
-  }
-
   bool swings() const {
     constexpr double kMostDamping = 0.5;  // of the frequency: a quarter of critical damping
     return best()[1] <= kMostDamping * frequency_rad_s(best()[0]);
@@ -77,18 +72,17 @@ class PendulumSearch {
 
   /// Returns the reduction of the mean square of held-out blocks.
   double gain() const {
-    const Selection selection(grams_);
-    if (!selection.is_sound()) return 0;
-    return 1 - selection.mean_square(with(kFixedLoad, member_)) / selection.mean_square(kFixedLoad);
+    const CrossValidation fits(grams_);
+    return 1 - fits.mean_square(with(kFixedLoad, member_)) / fits.mean_square(kFixedLoad);
   }
 
   /// Returns whether the load is heavy compared with the vehicle, or accounts for most of the weight of a rigid load.
   /// Recorded flights without a load showed slow oscillations of up to 3 % of the vehicle's mass.
   bool is_heavy() const {
     constexpr double kShareOfRatio = 0.5, kShareOfVehicle = 0.1;
-    const Selection selection(grams_);
-    const double ratio = selection.coefficients(kFixedLoad)[0];
-    const Eigen::VectorXd c = selection.coefficients(with(kFixedLoad, member_));
+    const CrossValidation fits(grams_);
+    const double ratio = fits.coefficients(kFixedLoad)[0];
+    const Eigen::VectorXd c = fits.coefficients(with(kFixedLoad, member_));
     const double load_kg = c[c.size() - 1];
     return load_kg > kShareOfVehicle * inputs_.model_of(passes_.kind)->mass_kg ||
            (load_kg > 0 && ratio < 0 && std::abs(c[0]) <= kShareOfRatio * std::abs(ratio));
@@ -111,7 +105,7 @@ class PendulumSearch {
   void condense() {
     const Passes beside = {inputs_, passes_.kind, flights_, passes_.records, passes_.jobs, passes_.progress};
     grams_ = block_grams(beside, {fixed_[0], fixed_[1], load_});
-    member_ = Selection(grams_).best_theta(kFixedLoad, kLoad);
+    member_ = CrossValidation(grams_).best_theta(kFixedLoad, kLoad);
   }
 
   const Passes& passes_;
@@ -144,7 +138,7 @@ std::optional<Candidate> visible_pendulum(const Passes& passes, const Coverage& 
   constexpr double kLeastGain = 0.003;
   if (search.gain() < kLeastGain) return std::nullopt;
   search.zoom();
-  if (!search.is_acceptable() || !search.swings() || !search.is_heavy()) return std::nullopt;
+  if (!search.swings() || !search.is_heavy()) return std::nullopt;
   return search.found();
 }
 

@@ -3,12 +3,11 @@
 #include <algorithm>
 #include <numeric>
 
-#include "analysis/identification/selection.h"
-
 namespace swarmcert::identification {
 namespace {
 
 constexpr double kLeastFallOfRates = 0.05;
+constexpr double kLeastShareOfMotion = 0.02;
 
 double mean_over_tracks(const std::vector<double>& values) {
   return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
@@ -53,7 +52,7 @@ bool TurningSearch::explains_motion(const Turned& next) const {
       shares.push_back(before * before - after * after);
     }
     const bool falls = error_ratio(next, axis) <= 1 - kLeastFallOfRates;
-    if (falls && mean_over_tracks(shares) >= Thresholds{}.gain) return true;
+    if (falls && mean_over_tracks(shares) >= kLeastShareOfMotion) return true;
   }
   return false;
 }

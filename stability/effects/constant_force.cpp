@@ -22,7 +22,6 @@ class ConstantForce : public Effect {
   static EffectTraits traits() {
     EffectTraits traits;
     traits.family = Family::kPush;
-    traits.may_turn_with_body = true;  // a tilted thrust axis, a biased accelerometer
     return traits;
   }
   void columns(const Instant&, const double*, Wrench* columns) const override {

@@ -69,9 +69,6 @@ struct EffectTraits {
   /// Flights hardly reach where it acts, so that its curve stays hidden: it is tried beside any remainder.
   bool hides_its_curve = false;
 
-  /// Constant in the world; what is constant in the body instead has no effect of its own and is called by this name.
-  bool may_turn_with_body = false;
-
   bool is_plain(Family of) const { return family == of && reduces_to == Family::kNone; }
   /// Returns whether its force is a curve over this variable.
   bool varies_with(const std::string& variable) const {

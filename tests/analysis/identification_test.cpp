@@ -5,8 +5,6 @@
 
 #include "analysis/identification/box_least_squares.h"
 #include "analysis/identification/covariance.h"
-#include "analysis/identification/injection.h"
-#include "analysis/identification/selection.h"
 #include "analysis/identification/verdict.h"
 #include "stability/effects/registry.h"
 
@@ -94,19 +92,6 @@ struct WhiteNoise {
   }
 };
 
-TEST(Detectable, SizesAreWhereInjectionsBeginToShow) {
-  const WhiteNoise noise;
-  const Grams grams = noise.grams(0);
-  const std::vector<Detectable> sizes = detectable(grams, {});
-  ASSERT_EQ(sizes.size(), 1u);
-  // The gain of 2 % needs size^2 / (size^2 + 0.01^2) = 0.02: 0.00143.
-  EXPECT_NEAR(sizes[0].size, 0.00143, 0.0003);
-  for (const double factor : {0.7, 1.3}) {
-    const Grams injected = noise.grams(factor * sizes[0].size);
-    EXPECT_EQ(Selection(injected).is_acceptable({}, {0, 0}), factor > 1) << factor;
-  }
-}
-
 /// A first-order process, whose mean has the variance (1 + rho) / (1 - rho) / n for long series. Blocks hold its
 /// values minus their mean, like residuals of a fit.
 TEST(LongRunVariance, IsThatOfTheMeanOfACorrelatedProcess) {
@@ -135,17 +120,6 @@ TEST(LongRunVariance, IsThatOfTheMeanOfACorrelatedProcess) {
   const std::vector<double> alike(kValues, 1);
   EXPECT_EQ(long_run_variance(alike, std::vector<char>(kValues, 0)), kValues)
       << "blocks that do not follow each other are independent";
-}
-
-TEST(TellingBlocks, AreAsManyAsCarryTheColumn) {
-  const WhiteNoise noise;
-  Grams grams = noise.grams(0);
-  EXPECT_NEAR(telling_blocks(grams, 0, 0), 40, 1);
-  grams.support = {{{0, 0, 0}}};
-  EXPECT_TRUE(is_supported(grams, 0, 0, 5, {})) << "nowhere near the floor, but seen in every block";
-  for (std::size_t k = 4; k < grams.blocks.size(); ++k) grams.blocks[k].gram[0] = 0;
-  EXPECT_NEAR(telling_blocks(grams, 0, 0), 4, 0.1);
-  EXPECT_FALSE(is_supported(grams, 0, 0, 5, {}));
 }
 
 TEST(Jackknife, IsTheVarianceOfWhiteNoiseAndKnowsWhenFewBlocksTell) {

@@ -40,8 +40,8 @@ std::vector<float> gust(double tau_s, double white, unsigned seed) {
   return series;
 }
 
-/// Flies `truth` three times and returns what is named.
-std::vector<identification::Missing> named_in(const Truth& truth) {
+/// Flies `truth` three times and diagnoses the flights.
+identification::Diagnosis diagnosis_of(const Truth& truth) {
   const ScratchFolder folder;
   for (int run = 0; run < 3; ++run)
     fly(truth, {Program::kRich, 1, 30, 4100 + static_cast<std::uint64_t>(run)}, folder.path(), run);
@@ -50,9 +50,10 @@ std::vector<identification::Missing> named_in(const Truth& truth) {
   arguments.flights = {folder.path()};
   const residuals::Inputs inputs = residuals::read_inputs(arguments);
   return identification::diagnose(inputs, inputs.models[0].kind, identification::every_flight(inputs), 2,
-                                  [](int, int) {})
-      .ranking;
+                                  [](int, int) {});
 }
+
+std::vector<identification::Missing> named_in(const Truth& truth) { return diagnosis_of(truth).ranking; }
 
 TEST(Evidence, ProductsOfTransformsAreThoseOfTheSeriesFadedAtBothEnds) {
   const evidence::Spectral spectral({{0, kManyRecords, kRecordStep_s}});
@@ -112,6 +113,23 @@ TEST(Evidence, NamesNothingInAGustAlone) {
   truth.gust_time_s = 0.7;
   for (const identification::Missing& missing : named_in(truth))
     ADD_FAILURE() << missing.effect << " is not there";
+}
+
+TEST(Evidence, NamesWhatIsHalfAsLargeAgainAsItsDetectableSizeAndNotWhatIsHalfOfIt) {
+  double size_N_s_m = 0;
+  for (const evidence::Detectable& entry : diagnosis_of({}).detectable) {
+    if (entry.effect == "drag_linear") size_N_s_m = entry.size;
+  }
+  ASSERT_GT(size_N_s_m, 0);
+  ASSERT_LT(size_N_s_m, 0.01);
+  for (const double factor : {0.5, 1.5}) {
+    SCOPED_TRACE(factor);
+    Truth truth;
+    truth.force_N = [&](const Moment& now) { return Eigen::Vector3d(-factor * size_N_s_m * now.v_m_s); };
+    const std::vector<identification::Missing> named = named_in(truth);
+    ASSERT_EQ(named.size(), factor > 1 ? 1u : 0u);
+    if (factor > 1) EXPECT_EQ(named[0].effect, "drag_linear");
+  }
 }
 
 TEST(Evidence, NamesADragInAGustWithItsValueAndAThrustScaleBesideItAmongWhatFlightsCannotTellApart) {

@@ -92,7 +92,7 @@ void print_diagnosis(const Diagnosis& diagnosis, const residuals::ForceUnit& uni
   for (const std::string& sentence : left_sentences(diagnosis, unit)) fmt::print("  {}\n", sentence);
   print_remainder(diagnosis, unit);
   fmt::print("  {}:\n", kDetectableWords);
-  for (const identification::Detectable& entry : diagnosis.detectable) {
+  for (const evidence::Detectable& entry : diagnosis.detectable) {
     if (std::isfinite(entry.size))
       fmt::print("    {} {} = {:.3g}\n", entry.effect, entry.parameter, entry.size);
     else
@@ -133,7 +133,7 @@ std::vector<std::string> next_flights(const Diagnosis& diagnosis, bool wants_all
       add(fmt::format("to separate {} from {}: {}; {}", missing.effect, rival.effect, missing.excitation,
                       rival.excitation));
   }
-  for (const identification::Detectable& entry : diagnosis.detectable) {
+  for (const evidence::Detectable& entry : diagnosis.detectable) {
     if (wants_all && !std::isfinite(entry.size))
       add(fmt::format("to see {} at all: {}", entry.effect, entry.excitation));
   }

@@ -77,8 +77,8 @@ void add_detectable(Report& report, const Diagnosis& diagnosis) {
   std::vector<std::vector<std::string>> rows;
   const bool all_show =
       std::all_of(diagnosis.detectable.begin(), diagnosis.detectable.end(),
-                  [](const identification::Detectable& entry) { return std::isfinite(entry.size); });
-  for (const identification::Detectable& entry : diagnosis.detectable) {
+                  [](const evidence::Detectable& entry) { return std::isfinite(entry.size); });
+  for (const evidence::Detectable& entry : diagnosis.detectable) {
     const bool shows = std::isfinite(entry.size);
     rows.push_back({entry.effect, entry.parameter,
                     shows ? fmt::format("{:.3g}", entry.size) : "not at any size",

@@ -19,10 +19,9 @@ using identification::Missing;
 using identification::ThrustScale;
 
 constexpr const char* kDetectableMeaning =
-    "the smallest size that these flights show in 90 % of injections (open loop: column times size is added "
-    "to the residual of resampled blocks; the flight does not react); null: not at any size within the "
-    "physical bounds; nothing_missing means none above these sizes, and nothing left above three times the "
-    "noise floor";
+    "the smallest size with which 90 % of flights like these would have named the effect (open loop: the "
+    "flight does not react); null: not at any size within the physical bounds; nothing_missing means none "
+    "above these sizes, and nothing left above three times the noise floor";
 
 InstrumentResult shown(const identification::InstrumentedValue& value, double beyond) {
   InstrumentResult result = {value};
@@ -118,7 +117,7 @@ void describe_kind(Record& record, const Diagnosis& diagnosis) {
 }
 
 struct DetectableOfKind {
-  identification::Detectable entry;
+  evidence::Detectable entry;
   std::string kind;
 };
 
@@ -127,7 +126,7 @@ void describe_detectable(Record& record, const DetectableOfKind& one) {
   record.field("kind", one.kind, "");
   record.field("parameter", one.entry.parameter, "");
   record.field("size", one.entry.size, "Smallest that these flights show; null: none.", "", "estimate");
-  record.field("shape", one.entry.shape, "Of the effect that was injected.");
+  record.field("shape", one.entry.shape, "Of the effect of this size.");
   record.field("excitation", one.entry.excitation, "Flights that would show smaller ones.");
 }
 
@@ -176,7 +175,7 @@ void describe(Record& record, const Diagnosed& found) {
   describe_remainder(record, found.diagnoses);
   std::vector<DetectableOfKind> detectable;
   for (const Diagnosis& diagnosis : found.diagnoses)
-    for (const identification::Detectable& entry : diagnosis.detectable)
+    for (const evidence::Detectable& entry : diagnosis.detectable)
       detectable.push_back({entry, diagnosis.kind});
   record.list("detectable", detectable, "The smallest size of each effect that these flights would show.",
               describe_detectable);

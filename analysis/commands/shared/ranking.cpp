@@ -52,12 +52,12 @@ void describe(Record& record, const Ranked& entry) {
   record.field("parameters", entry.parameters, "Fitted values; units stand in the names.");
   record.field("per_vehicle", entry.per_vehicle, "Each vehicle has values of its own.");
   record.field("model_form", entry.model_form,
-               "Range of each coefficient over fits without a part of the data, and with a rival beside it.");
+               "Range of each coefficient over fits without a part of the data.");
   record.field("instrument", entry.instrument, "The check of each coefficient by set points.");
   record.field("evidence_bits", entry.evidence_bits,
-               "Logarithm of the odds that these data give it over its absence, from the Wald statistic, "
-               "which is robust "
-               "to errors correlated over 2 s, less what its parameters cost (Schwarz); null: not known.",
+               "Logarithm of the odds of the best explanation with it over the best without it. Of an effect "
+               "that was not searched: from the Wald statistic, which is robust to errors correlated over 2 s, "
+               "less what its parameters cost (Schwarz). null: not known.",
                "bit", "estimate");
   record.list("alternatives", alternatives_of(entry), "What could stand in its place.",
               [](Record& r, const Alternative& other) {

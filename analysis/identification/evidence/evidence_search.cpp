@@ -4,11 +4,18 @@
 #include <algorithm>
 #include <cmath>
 
+#include "nn/base/doubles.h"
+
 namespace swarmcert::evidence {
 namespace {
 
 const double kNatsPerBit = std::log(2.0);
 constexpr std::size_t kMostExplanations = 8;
+
+/// Returns 1/2 ln det of a factored matrix.
+double half_log_determinant(const Eigen::LLT<Eigen::MatrixXd>& factor) {
+  return factor.matrixLLT().diagonal().array().log().sum();
+}
 
 /// ln of the normal distribution function.
 double log_normal_cdf(double z) {
@@ -54,13 +61,10 @@ bool is_effect(const Hypotheses& all, const Item& item) {
   return all.entries[item.entry].kind == Kind::kEffect;
 }
 
-/// Returns the best effect with at least this score, else the best of all.
-/// @param options best first; not empty
-Option preferred(const Hypotheses& all, const std::vector<Option>& options, double least) {
-  for (const Option& option : options) {
-    if (option.score >= least && is_effect(all, option.item)) return option;
-  }
-  return options.front();
+/// Returns whether an item is a curve over the variable of an effect.
+bool is_form_of(const Hypotheses& all, const Item& curve, const Item& effect) {
+  return !is_effect(all, curve) && is_effect(all, effect) &&
+         all.candidates[effect.entry].info.traits.varies_with(all.entries[curve.entry].variable);
 }
 
 }  // namespace
@@ -120,20 +124,31 @@ Normal EvidenceSearch::normal_of(const Set& set) const {
   return normal;
 }
 
+double EvidenceSearch::noise_beside(double left) const {
+  return std::max(1.0, left / static_cast<double>(data_.data().size()));
+}
+
+double EvidenceSearch::log_likelihood(double left) const {
+  const double noise = noise_beside(left);
+  return -left / (2 * noise) - static_cast<double>(data_.data().size()) / 2 * std::log(noise);
+}
+
 Weighed EvidenceSearch::weigh(const Set& set) const {
-  Weighed result{set, -data_.data_square() / 2, {}, {}};
-  if (set.empty()) return result;
+  Weighed result{set, 0, data_.data_square(), {}, {}};
+  if (set.empty()) {
+    result.score = log_likelihood(result.left);
+    return result;
+  }
   const Prior prior = prior_of(set);
   const Normal normal = normal_of(set);
   const Eigen::VectorXd pull = normal.b + prior.precision * prior.mean;
   const Eigen::LLT<Eigen::MatrixXd> hessian(normal.gram + prior.precision), precision(prior.precision);
-  const auto half_log_determinant = [](const Eigen::LLT<Eigen::MatrixXd>& factor) {
-    return factor.matrixLLT().diagonal().array().log().sum();
-  };
   result.coefficients = hessian.solve(pull);
-  result.covariance = hessian.solve(Eigen::MatrixXd::Identity(pull.size(), pull.size()));
-  result.score += (pull.dot(result.coefficients) - prior.mean.dot(prior.precision * prior.mean)) / 2 +
-                  half_log_determinant(precision) - half_log_determinant(hessian);
+  result.left -= pull.dot(result.coefficients) - prior.mean.dot(prior.precision * prior.mean);
+  result.covariance =
+      noise_beside(result.left) * hessian.solve(Eigen::MatrixXd::Identity(pull.size(), pull.size()));
+  result.score =
+      log_likelihood(result.left) + half_log_determinant(precision) - half_log_determinant(hessian);
   for (Eigen::Index i = 0; i < pull.size(); ++i) {
     if (prior.sign[i] == 0) continue;
     result.score +=
@@ -160,11 +175,38 @@ Option EvidenceSearch::option(const Set& set, std::size_t entry) const {
   return best;
 }
 
+bool EvidenceSearch::may_add(const Set& set, std::size_t entry) const {
+  return !has_entry(all_, set, entry) && all_.excluded.count(all_.entries[entry].name) == 0;
+}
+
+double EvidenceSearch::size_for(double bits, const Set& set, const Item& item, int coefficient) const {
+  constexpr double kNineOfTen_z = 1.2816;
+  const Set joined = with(set, item);
+  const Eigen::MatrixXd all =
+      normal_of(joined).gram / noise_beside(weigh(set).left) + prior_of(joined).precision;
+  const Prior& prior = all_.prior_of(item);
+  const Eigen::MatrixXd& P = prior.precision;
+  const Eigen::Index n = P.rows(), others = all.rows() - n;
+  const Eigen::MatrixXd H = all.bottomRightCorner(n, n) -
+                            all.bottomLeftCorner(n, others) *
+                                all.topLeftCorner(others, others).llt().solve(all.topRightCorner(others, n));
+  const Eigen::VectorXd g = (H - P).col(coefficient), pull = P * prior.mean;
+  const Eigen::LLT<Eigen::MatrixXd> hessian(H);
+  // The evidence rises by square c^2 + linear c + constant.
+  const double square = g.dot(hessian.solve(g)) / 2, linear = g.dot(hessian.solve(pull));
+  const double constant = (pull.dot(hessian.solve(pull)) - pull.dot(prior.mean)) / 2 +
+                          half_log_determinant(Eigen::LLT<Eigen::MatrixXd>(P)) -
+                          half_log_determinant(hessian) + all_.log_prior(item);
+  if (!(square > 0) || !(g[coefficient] > 0)) return kInfinity;
+  const double missing = std::max(bits * kNatsPerBit - constant, 0.0);
+  const double estimate = (std::sqrt(linear * linear + 4 * square * missing) - linear) / (2 * square);
+  return estimate + kNineOfTen_z / std::sqrt(g[coefficient]);
+}
+
 std::vector<Option> EvidenceSearch::options(const Set& set) const {
   std::vector<Option> result;
   for (std::size_t e = 0; e < all_.entries.size(); ++e) {
-    if (!has_entry(all_, set, e) && all_.excluded.count(all_.entries[e].name) == 0)
-      result.push_back(option(set, e));
+    if (may_add(set, e)) result.push_back(option(set, e));
   }
   std::sort(result.begin(), result.end(), [](const Option& a, const Option& b) { return a.score > b.score; });
   return result;
@@ -189,27 +231,57 @@ std::vector<Option> EvidenceSearch::instead_of(const Weighed& best, std::size_t 
   return result;
 }
 
+double EvidenceSearch::needed_bits(const Weighed& now) const {
+  return std::max(kNamed_bits, kModelError * (data_.data_square() - now.left) / 2 / kNatsPerBit);
+}
+
+bool EvidenceSearch::shows_form(const Weighed& named, const Weighed& free) const {
+  constexpr double kLeft = 0.8;
+  return free.score > named.score + needed_bits(named) * kNatsPerBit && free.left < kLeft * named.left;
+}
+
+bool EvidenceSearch::may_follow(const Weighed& now, const Option& added) const {
+  if (added.score < now.score + needed_bits(now) * kNatsPerBit) return false;
+  const bool is_form = std::any_of(now.set.begin(), now.set.end(),
+                                   [&](const Item& effect) { return is_form_of(all_, added.item, effect); });
+  return !is_form || shows_form(now, weigh(with(now.set, added.item)));
+}
+
 Set EvidenceSearch::changed(const Weighed& now, std::size_t index) const {
-  if (bits(now, index) < kNamed_bits) return without(now.set, index);
-  const Set rest = without(now.set, index);
-  const Option other = options(rest).front();
-  const bool loses_name = is_effect(all_, now.set[index]) && !is_effect(all_, other.item);
-  const double needed_bits = loses_name ? kNamed_bits : kExchanged_bits;
-  const bool is_better = other.score > now.score + needed_bits * kNatsPerBit;
-  return is_better && !(other.item == now.set[index]) ? with(rest, other.item) : now.set;
+  const Item& item = now.set[index];
+  if (bits(now, index) < needed_bits(now)) return without(now.set, index);
+  const Weighed rest = weigh(without(now.set, index));
+  const auto is_better = [&](const Option& other) {
+    if (other.item == item) return false;
+    const bool loses_name = is_effect(all_, item) && !is_effect(all_, other.item);
+    const Set exchanged = with(rest.set, other.item);
+    if (is_form_of(all_, other.item, item)) return shows_form(now, weigh(exchanged));
+    if (is_form_of(all_, item, other.item))
+      return may_follow(rest, other) && !shows_form(weigh(exchanged), now);
+    const double needed = loses_name ? needed_bits(now) : kExchanged_bits;
+    return other.score > now.score + needed * kNatsPerBit;
+  };
+  const std::vector<Option> others = options(rest.set);
+  const auto other = std::find_if(others.begin(), others.end(), is_better);
+  return other == others.end() ? now.set : with(rest.set, other->item);
 }
 
 Weighed EvidenceSearch::next(const Weighed& now) const {
-  const double least = now.score + kNamed_bits * kNatsPerBit;
-  const Option added = preferred(all_, options(now.set), least);
-  const bool is_enough = added.score >= least && now.set.size() < kMostExplanations;
-  if (is_enough && is_effect(all_, added.item)) return weigh(with(now.set, added.item));
+  const bool has_room = now.set.size() < kMostExplanations;
+  const std::vector<Option> added = has_room ? options(now.set) : std::vector<Option>();
+  const auto best = [&](bool is_name) {
+    return std::find_if(added.begin(), added.end(), [&](const Option& option) {
+      return is_effect(all_, option.item) == is_name && may_follow(now, option);
+    });
+  };
+  if (const auto name = best(true); name != added.end()) return weigh(with(now.set, name->item));
   // No further effect: the set is complete enough to be judged.
   for (std::size_t i = 0; i < now.set.size(); ++i) {
     const Set other = changed(now, i);
     if (!(other == now.set)) return weigh(other);
   }
-  return is_enough ? weigh(with(now.set, added.item)) : now;
+  const auto curve = best(false);
+  return curve == added.end() ? now : weigh(with(now.set, curve->item));
 }
 
 }  // namespace swarmcert::evidence

@@ -3,7 +3,8 @@
 /// For a set with columns X, prior N(mu, P^-1) and data y of variance 1,
 ///   ln p(y | set) = -1/2 (y - X c)'(y - X c) - 1/2 (c - mu)' P (c - mu) + 1/2 ln det P - 1/2 ln det H,
 /// H = X'X + P, c = H^-1 (X'y + P mu), up to a constant of the data; where a coefficient has a sign, the probabilities
-/// of the sign after and before the flights are added. Sets are compared by this number and ln p(set) alone.
+/// of the sign after and before the flights are added. Sets are compared by this number and ln p(set) alone. No set
+/// explains everything, so the variance is that of what a set leaves, where this is more than 1.
 #pragma once
 
 #include <vector>
@@ -14,17 +15,20 @@
 namespace swarmcert::evidence {
 
 /// An explanation is added if the set gains odds of 128 : 1, removed if it gains less, and exchanged if it gains 4 : 1.
-/// Effects are added before curves; a curve takes the place of an effect with the former odds: below, flights cannot
-/// tell them apart.
+/// Effects are added before curves. A curve takes the place of an effect with the former odds; one over the variable of
+/// the effect, in its place or beside it, also has to leave a fifth less: no drag is exactly linear.
 inline constexpr double kNamed_bits = 7, kExchanged_bits = 2;
+/// Forces are modelled to about a percent. Beside a set, a ten-thousandth of its evidence is thus none.
+inline constexpr double kModelError = 1e-4;
 
 using Set = std::vector<Item>;
 
 struct Weighed {
   Set set;
   double score = 0;              ///< ln p(y | set) + ln p(set), nats
+  double left = 0;               ///< (y - X c)'(y - X c) + (c - mu)' P (c - mu)
   Eigen::VectorXd coefficients;  ///< c, item by item
-  Eigen::MatrixXd covariance;    ///< H^-1
+  Eigen::MatrixXd covariance;    ///< H^-1, times the variance of the noise
 };
 
 /// Something to add to a set.
@@ -47,6 +51,14 @@ class EvidenceSearch {
   /// Returns by how much the entry of the item at `index` raises the evidence of the set, in bits.
   double bits(const Weighed& best, std::size_t index) const;
   Weighed weigh(const Set& set) const;
+  /// Returns whether a set in which an effect has a free form explains clearly more than one in which it has its own.
+  bool shows_form(const Weighed& named, const Weighed& free) const;
+  /// Returns the size of one coefficient with which an item would raise the evidence of `set` by `bits` in 90 % of
+  /// flights. With G = X'X of the item beside the set, the evidence rises as in weigh() by a quadratic function of the
+  /// estimate, which scatters by 1/sqrt(G_kk) about the size. Signs of coefficients, worth up to a bit, are left out.
+  double size_for(double bits, const Set& set, const Item& item, int coefficient) const;
+  /// Returns whether an entry is neither in a set, nor excluded.
+  bool may_add(const Set& set, std::size_t entry) const;
   /// Returns the columns of a set, item by item.
   std::vector<int> columns_of(const Set& set) const;
   /// Returns y - X c.
@@ -61,6 +73,13 @@ class EvidenceSearch {
   Option option(const Set& set, std::size_t entry) const;
   /// Returns what may be added to a set, best first.
   std::vector<Option> options(const Set& set) const;
+  /// Returns the variance of the noise, and ln p(y) up to a constant, beside a set that leaves this much.
+  double noise_beside(double left) const;
+  double log_likelihood(double left) const;
+  /// Returns the bits by which an explanation has to raise the evidence of a set.
+  double needed_bits(const Weighed& now) const;
+  /// Returns whether something may be added to a set.
+  bool may_follow(const Weighed& now, const Option& added) const;
   /// Returns the set without the item at `index`, or with another in its place, if that is better.
   Set changed(const Weighed& now, std::size_t index) const;
 

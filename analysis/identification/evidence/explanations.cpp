@@ -7,7 +7,6 @@
 #include "analysis/identification/evidence/evidence_search.h"
 #include "analysis/identification/evidence/projection.h"
 #include "analysis/identification/evidence/shapes.h"
-
 namespace swarmcert::evidence {
 namespace {
 
@@ -37,18 +36,6 @@ Found found_on(const identification::Passes& passes, const Projection& projectio
   return found;
 }
 
-/// Searches what set points can have caused. Where they cause something that no explanation has, it counts as noise.
-Found found_by_set_points(const identification::Passes& passes, Hypotheses& all) {
-  constexpr int kMostRounds = 4;
-  Projection projection = Projection::on_set_points(all);
-  Found found = found_on(passes, projection, all, {});
-  for (int round = 1; round < kMostRounds; ++round) {
-    if (!projection.temper(EvidenceSearch(all, found.data).left_by(found.best))) break;
-    found = found_on(passes, projection, all, found.best.set);
-  }
-  return found;
-}
-
 /// Searches all data. Their noise is what the best set leaves, so that both are found in turn.
 Found found_in_everything(const identification::Passes& passes, Hypotheses& all) {
   constexpr int kMostRounds = 3;
@@ -63,34 +50,15 @@ Found found_in_everything(const identification::Passes& passes, Hypotheses& all)
   return found;
 }
 
-/// Returns the bits that the set loses with the constant form in the world of the item at `index`, if that has another.
-double lost_in_world(const EvidenceSearch& search, const Weighed& best, std::size_t index) {
-  Weighed in_world = best;
-  in_world.set[index].shape = 0;
-  return (best.score - search.weigh(in_world.set).score) / std::log(2.0);
-}
-
-/// Returns the bits that the set loses without two of its items.
-double bits_of_both(const EvidenceSearch& search, const Weighed& best, std::size_t a, std::size_t b) {
-  Set rest;
-  for (std::size_t i = 0; i < best.set.size(); ++i) {
-    if (i != a && i != b) rest.push_back(best.set[i]);
-  }
-  return (best.score - search.weigh(rest).score) / std::log(2.0);
-}
-
-/// Returns whether the effect at `index` has another form than the flights show: a tenth of the evidence for it is for a
-/// curve over its own variable beside it, or is only for what turns with the body.
+/// Returns whether the effect at `index` has another form than the flights show, which a curve over its variable shows.
 bool is_refuted(const Hypotheses& all, const EvidenceSearch& search, const Weighed& best, std::size_t index) {
-  constexpr double kShare = 0.1;
   const stability::EffectTraits& traits = all.candidates[best.set[index].entry].info.traits;
-  if (traits.may_turn_with_body && lost_in_world(search, best, index) > kShare * search.bits(best, index))
-    return true;
   for (std::size_t i = 0; i < best.set.size(); ++i) {
     const Entry& entry = all.entries[best.set[i].entry];
-    if (entry.kind == Kind::kCurve && traits.varies_with(entry.variable) &&
-        search.bits(best, i) > kShare * bits_of_both(search, best, index, i))
-      return true;
+    if (entry.kind != Kind::kCurve || !traits.varies_with(entry.variable)) continue;
+    Set without = best.set;
+    without.erase(without.begin() + static_cast<std::ptrdiff_t>(i));
+    if (search.shows_form(search.weigh(without), best)) return true;
   }
   return false;
 }
@@ -114,7 +82,8 @@ Named named(const Hypotheses& all, const EvidenceSearch& search, const Weighed& 
 
 /// Returns the best set without the excluded effects.
 Found best_found(const identification::Passes& passes, Hypotheses& all) {
-  return all.has_set_points() ? found_by_set_points(passes, all) : found_in_everything(passes, all);
+  return all.has_set_points() ? found_on(passes, Projection::on_set_points(all), all, {})
+                              : found_in_everything(passes, all);
 }
 
 /// Returns the names of the effects of a set that are refuted.
@@ -142,6 +111,7 @@ Explanations described(const Hypotheses& all, const Found& found) {
     if (entry.name == kDragCurve) result.has_drag_curve = true;
     first += entry.size;
   }
+  result.detectable = detectable(all, search, found.best);
   std::stable_sort(result.effects.begin(), result.effects.end(),
                    [](const Named& a, const Named& b) { return a.evidence_bits > b.evidence_bits; });
   return result;

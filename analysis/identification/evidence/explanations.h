@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "analysis/identification/evidence/detectable.h"
 #include "analysis/identification/evidence/hypotheses.h"
 #include "analysis/identification/findings.h"
 
@@ -21,6 +22,7 @@ struct Explanations {
   std::vector<Named> effects;       ///< in the order of their evidence
   std::vector<std::string> curves;  ///< free curves beside them: "force_z over z"
   bool has_drag_curve = false;      ///< one of them is a force against the velocity
+  std::vector<Detectable> detectable;
   /// The data are what set points can have caused. Otherwise a log has none, and the answer of a controller to a
   /// disturbance may look like an effect of thrust or velocity.
   bool is_by_set_points = false;

@@ -113,7 +113,8 @@ Entry entry_of(const CurveOver& over, int first_column, double weight_N) {
       break;
   }
   entry.kind = Kind::kCurve;
-  entry.variable = variable;
+  const bool is_across = variable[0] == 'v' && variable.size() == 2 && variable[1] != "xyz"[over.axis];
+  if (!is_across) entry.variable = variable;
   entry.size = Curve::kSize;
   entry.first_column = {first_column};
   constexpr double kLevel = 0.05;  // precision of a constant, relative to that of bends
@@ -124,6 +125,18 @@ Entry entry_of(const CurveOver& over, int first_column, double weight_N) {
       entry.priors.push_back(
           {zero, (level + smoothness * Curve::roughness()) / std::pow(deviation * weight_N, 2), zero});
   }
+  return entry;
+}
+
+/// Returns the entry of a force that turns with the body: that of a biased accelerometer, or of a tilted thrust axis.
+Entry entry_of_body(int first_column, double weight_N) {
+  Entry entry;
+  entry.name = "constant force of the body";
+  entry.kind = Kind::kCurve;
+  entry.size = 3;
+  entry.first_column = {first_column, first_column + 3};
+  entry.shapes = entry.first_column.size();
+  entry.priors = priors_of(Eigen::Vector3d::Constant(kUsual * weight_N), Eigen::Vector3d::Zero());
   return entry;
 }
 
@@ -200,20 +213,15 @@ Hypotheses hypotheses(const identification::Passes& passes,
         const std::lock_guard<std::mutex> lock(mutex);
         for (const Stretch& stretch : placed.stretches) energy.add(values, stretch);
       });
-  for (std::size_t k = 0; k < candidates.size(); ++k) {
-    std::vector<int> first_column = grams.first_column[k];
-    if (candidates[k].info.traits.may_turn_with_body && candidates[k].vehicles.empty()) {
-      const auto in_body = static_cast<int>(TrackColumns::body_column(grams, surveyed.curves));
-      first_column.push_back(in_body);
-      first_column.push_back(in_body + 3);
-    }
-    result.entries.push_back(entry_of(candidates[k], std::move(first_column), energy, weight_N));
-  }
+  for (std::size_t k = 0; k < candidates.size(); ++k)
+    result.entries.push_back(entry_of(candidates[k], grams.first_column[k], energy, weight_N));
   int column = grams.columns;
   for (const CurveOver& over : surveyed.curves) {
     result.entries.push_back(entry_of(over, column, weight_N));
     column += Curve::kSize;
   }
+  result.entries.push_back(
+      entry_of_body(static_cast<int>(TrackColumns::body_column(grams, surveyed.curves)), weight_N));
   result.instruments = instruments.of_axes();
   return result;
 }

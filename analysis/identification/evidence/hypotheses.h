@@ -32,7 +32,7 @@ struct Prior {
 struct Entry {
   std::string name;  ///< of the effect, or "force_z over z"
   Kind kind = Kind::kEffect;
-  std::string variable;           ///< of a curve
+  std::string variable;           ///< of a curve; empty for a component of the velocity across its force
   double doubt = 0;               ///< ln of odds against it, before any flight
   int size = 1;                   ///< columns
   std::vector<int> first_column;  ///< by shape

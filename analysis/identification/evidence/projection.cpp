@@ -116,21 +116,6 @@ Eigen::VectorXf Projection::of(const std::array<Eigen::VectorXf, 3>& series) con
   return of(Columns{series[0], series[1], series[2]}).col(0);
 }
 
-bool Projection::temper(const Eigen::VectorXd& left) {
-  constexpr double kLeast = 1.05;
-  bool is_raised = false;
-  Eigen::Index first = 0;
-  for (Eigen::MatrixXf& weighted : weighted_) {
-    const double misfit =
-        left.segment(first, weighted.cols()).squaredNorm() / static_cast<double>(weighted.cols());
-    first += weighted.cols();
-    if (misfit < kLeast) continue;
-    weighted /= static_cast<float>(std::sqrt(misfit));
-    is_raised = true;
-  }
-  return is_raised;
-}
-
 Eigen::VectorXd power_beside(const Hypotheses& all, const std::vector<int>& columns,
                              const Eigen::VectorXd& coefficients) {
   const auto bands = static_cast<Eigen::Index>(all.spectral.bands().size());

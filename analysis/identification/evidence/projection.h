@@ -20,11 +20,6 @@ class Projection {
   Eigen::MatrixXf of(const Columns& columns) const;
   Eigen::VectorXf of(const std::array<Eigen::VectorXf, 3>& series) const;
 
-  /// Raises the noise of each axis to what a set leaves: a force of the set points that no explanation has.
-  /// @param left numbers, axis below axis
-  /// @return whether the noise of an axis rises by more than a few percent
-  bool temper(const Eigen::VectorXd& left);
-
  private:
   bool is_on_basis_ = false;
   /// By axis: the basis divided by the standard deviations, [rows x numbers]; or their inverses, [rows x 1].
