@@ -3,7 +3,6 @@
 #include <atomic>
 
 #include "analysis/identification/block_rows.h"
-#include "analysis/identification/column_memory.h"
 
 namespace swarmcert::identification {
 namespace {
@@ -68,8 +67,7 @@ Grams columns_of(std::vector<Candidate> candidates) {
   return grams;
 }
 
-Grams block_grams(const Passes& passes, std::vector<Candidate> candidates, Kept kept) {
-  if (passes.memory != nullptr) return passes.memory->grams(passes, std::move(candidates), kept);
+Grams block_grams(const Passes& passes, std::vector<Candidate> candidates) {
   return made_anew(passes, std::move(candidates), nullptr);
 }
 

@@ -52,11 +52,8 @@ Eigen::VectorXd part_of(const Eigen::VectorXd& all, const std::vector<int>& colu
 /// Returns the columns of `candidates` without any flight.
 Grams columns_of(std::vector<Candidate> candidates);
 
-/// Whether the columns of a pass will be requested again, so that Passes::memory should keep them.
-enum class Kept { kNo, kYes };
-
 /// Condenses the flights. The result does not depend on the number of threads.
-Grams block_grams(const Passes& passes, std::vector<Candidate> candidates, Kept kept = Kept::kNo);
+Grams block_grams(const Passes& passes, std::vector<Candidate> candidates);
 
 /// Like block_grams() for whitened columns and a whitened residual.
 Grams whitened_grams(const Passes& passes, std::vector<Candidate> candidates, const Noise& noise);

@@ -17,7 +17,6 @@ struct Candidate {
   stability::EffectInfo info;  ///< per-vehicle coefficients ("cf50.force_x_N") if `vehicles` is not empty
   std::vector<std::vector<double>> thetas;
   std::vector<std::string> vehicles = {};  ///< vehicles with their own coefficients; empty: shared by all
-  std::size_t refined_thetas = 0;  ///< number of thetas at the end of `thetas` that come from a refinement
   /// For a lag or delay of the thrust: the factor 1 + c of its column, where c is the model's own thrust_ratio.
   double scale = 1;
 

@@ -8,7 +8,6 @@
 #include <set>
 
 #include "analysis/identification/balance/torque_balance.h"
-#include "analysis/identification/column_memory.h"
 #include "analysis/identification/rotors/lone_rotor.h"
 #include "analysis/identification/scan/named_forms.h"
 #include "analysis/identification/selected.h"
@@ -122,10 +121,9 @@ Diagnosis diagnose(const residuals::Inputs& inputs, const std::string& kind, con
   const bool is_excerpt = covered.blocks > most_searched;
   const Coverage seen = is_excerpt ? coverage(searched, kind, which, jobs) : covered;
   result.searched_blocks = seen.blocks;
-  const auto memory = std::make_shared<ColumnMemory>(which.size(), seen.records);
-  const Passes passes = {searched, kind, which, seen.records, jobs, progress, memory};
+  const Passes passes = {
+      searched, kind, which, seen.records, jobs, progress, std::make_shared<KnownTracks>(which.size())};
   Explained explained = explain(passes, seen);
-  memory->forget_kept();
   const residuals::Inputs whole = kept_tracks(inputs, kind, covered.blocks, covered.blocks);
   const Passes all = is_excerpt ? Passes{whole, kind, which, covered.records, jobs, progress} : passes;
   Settled& settled = explained.settled;
@@ -193,7 +191,12 @@ std::vector<Missing> fit_effects(const residuals::Inputs& inputs, const std::str
         selected.members[i] = best;
     }
   }
-  selected.refined = with_innovations(passes, refine(passes, selected.grams, selected.members));
+  std::vector<Start> starts;
+  for (const Member& member : selected.members) {
+    const Candidate& candidate = fits.candidate(member);
+    starts.push_back({candidate, candidate.thetas[static_cast<std::size_t>(member.theta)]});
+  }
+  selected.refined = with_innovations(passes, refine(passes, starts));
   selected.checks = instrument(passes, candidates_of(selected.refined));
   widen_by_bias(selected.checks, instrument_with_shapes(passes, selected.refined), selected.refined);
   return ranking_of(passes, selected);

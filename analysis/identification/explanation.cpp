@@ -121,37 +121,34 @@ std::vector<Candidate> candidates_to_weigh(const Passes& passes, const Coverage&
 }
 
 /// Returns the effects of `found` with values, intervals and checks, in the order in which they lower the error most.
-Selected selected_of(const Passes& passes, std::vector<Candidate> candidates,
+Selected selected_of(const Passes& passes, const std::vector<Candidate>& candidates,
                      const evidence::Explanations& found) {
-  Members members;
-  for (const evidence::Named& named : found.effects) {
-    const auto candidate = std::find_if(candidates.begin(), candidates.end(), [&](const Candidate& other) {
-      return other.name == named.candidate.name;
-    });
-    std::vector<std::vector<double>>& thetas = candidate->thetas;
-    const auto theta = std::find(thetas.begin(), thetas.end(), named.candidate.thetas[0]);
-    members.push_back(
-        {static_cast<int>(candidate - candidates.begin()), static_cast<int>(theta - thetas.begin())});
-    if (theta != thetas.end()) continue;
-    thetas.push_back(named.candidate.thetas[0]);
-    ++candidate->refined_thetas;
-  }
+  std::vector<Candidate> named;
+  for (const evidence::Named& effect : found.effects) named.push_back(effect.candidate);
   Selected result;
-  result.grams = block_grams(passes, std::move(candidates), Kept::kYes);
-  result.members = CrossValidation(result.grams).ordered(members);
-  result.refined = with_innovations(passes, refine(passes, result.grams, result.members));
+  result.grams = block_grams(passes, named);
+  for (int i = 0; i < static_cast<int>(named.size()); ++i) result.members.push_back({i, 0});
+  result.members = CrossValidation(result.grams).ordered(result.members);
+  std::vector<Start> starts;
+  for (const Member& member : result.members) {
+    const Candidate& one = named[static_cast<std::size_t>(member.candidate)];
+    const auto with_grid = std::find_if(candidates.begin(), candidates.end(), [&](const Candidate& other) {
+      return other.name == one.name && other.vehicles == one.vehicles;
+    });
+    starts.push_back({*with_grid, one.thetas[0]});
+  }
+  result.refined = with_innovations(passes, refine(passes, starts));
   result.checks = instrument(passes, candidates_of(result.refined));
   widen_by_bias(result.checks, instrument_with_shapes(passes, result.refined), result.refined);
   return result;
 }
 
-/// Returns the effects without which held-out blocks are predicted better.
-std::set<std::string> unhelpful(const Selected& selected) {
-  const CrossValidation fits(selected.grams);
+/// Returns the effects of which held-out blocks do not say, with 90 % confidence, that they lower the error.
+std::set<std::string> unhelpful(const std::vector<Missing>& ranking) {
+  constexpr double kConfirmed_z = 1.28;
   std::set<std::string> names;
-  for (std::size_t i = 0; i < selected.members.size(); ++i) {
-    if (fits.mean_square(selected.members) > fits.mean_square(without(selected.members, i)))
-      names.insert(selected.refined[i].candidate.name);
+  for (const Missing& missing : ranking) {
+    if (!(missing.finding.paired_z > kConfirmed_z)) names.insert(missing.effect);
   }
   return names;
 }
@@ -200,7 +197,7 @@ void settle(const Passes& passes, const std::vector<Candidate>& candidates, Expl
     result.has_curves = !found.curves.empty();
     doubtful = out_of_bounds(settled.selected);
     settled.at_bound.insert(doubtful.begin(), doubtful.end());
-    doubtful.merge(unhelpful(settled.selected));
+    doubtful.merge(unhelpful(settled.ranking));
     hypotheses.excluded.insert(doubtful.begin(), doubtful.end());
   } while (!doubtful.empty());
   const auto is_of_scan = [](const auto& entry) {

@@ -1,14 +1,11 @@
 #include "analysis/identification/instrument.h"
 
-#include <fmt/format.h>
-
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
 #include "analysis/identification/block_rows.h"
-#include "analysis/identification/column_memory.h"
 #include "analysis/identification/covariance.h"
 
 namespace swarmcert::identification {
@@ -54,27 +51,22 @@ std::vector<Moments> moments_of(const ModelledTrack& track, const Eigen::MatrixX
   return blocks;
 }
 
-/// Computes estimates() without the cache.
-std::vector<InstrumentedValue> made_estimates(const Passes& passes, const Grams& columns,
-                                              const Eigen::MatrixXd& mix) {
+/// Returns both estimates of each unknown. Empty if a log has no setpoints or nothing moves.
+std::vector<InstrumentedValue> estimates(const Passes& passes, const Grams& columns,
+                                         const Eigen::MatrixXd& mix) {
   const Eigen::Index n = mix.cols();
   std::vector<std::vector<Moments>> pieces(passes.flights.size());
   std::vector<char> complete(passes.flights.size(), 1);
-  const auto add = [&](std::size_t k, const ModelledTrack& track, const Eigen::MatrixXd& flown,
-                       const Eigen::MatrixXd& wanted) {
-    for (Moments& block : moments_of(track, flown, wanted, mix)) pieces[k].push_back(std::move(block));
-  };
-  const bool remembers = passes.memory != nullptr;
   over_modelled_tracks(passes, [&](std::size_t k, const ModelledTrack& modelled) {
     const Track& track = modelled.track;
-    if (track.targets.size() != track.instants.size())
-      complete[k] = 0;
-    else if (n > 0 && !remembers)
-      add(k, modelled, columns_along(passes.inputs, modelled, columns, track.instants),
-          columns_along(passes.inputs, modelled, columns, as_commanded(track, modelled.model.mass_kg)));
+    if (track.targets.size() != track.instants.size()) complete[k] = 0;
+    if (n == 0 || complete[k] == 0) return;
+    const Eigen::MatrixXd flown = columns_along(passes.inputs, modelled, columns, track.instants);
+    const Eigen::MatrixXd wanted =
+        columns_along(passes.inputs, modelled, columns, as_commanded(track, modelled.model.mass_kg));
+    for (Moments& block : moments_of(modelled, flown, wanted, mix)) pieces[k].push_back(std::move(block));
   });
   if (n == 0 || std::find(complete.begin(), complete.end(), 0) != complete.end()) return {};
-  if (remembers) passes.memory->over_columns(passes, columns, add);
   Moments sum{Eigen::MatrixXd::Zero(n, n), Eigen::MatrixXd::Zero(n, n), Eigen::VectorXd::Zero(n),
               Eigen::VectorXd::Zero(n)};
   for (const auto& piece : pieces) {
@@ -113,18 +105,6 @@ std::vector<InstrumentedValue> made_estimates(const Passes& passes, const Grams&
     values.push_back(value);
   }
   return values;
-}
-
-/// Returns both estimates of each unknown. Empty if a log has no setpoints or nothing moves.
-std::vector<InstrumentedValue> estimates(const Passes& passes, const Grams& columns,
-                                         const Eigen::MatrixXd& mix) {
-  if (passes.memory == nullptr) return made_estimates(passes, columns, mix);
-  std::string text;
-  for (const double value : mix.reshaped()) text += fmt::format("{:a} ", value);
-  const auto [known, is_new] = passes.memory->instrumented.emplace(text + text_of(columns.candidates),
-                                                                   std::vector<InstrumentedValue>());
-  if (is_new) known->second = made_estimates(passes, columns, mix);
-  return known->second;
 }
 
 /// Converts the coefficients in `mix` to those of the model: see scaled_stages().

@@ -1,6 +1,5 @@
 #include "analysis/identification/passes.h"
 
-#include "analysis/identification/column_memory.h"
 #include "analysis/residuals/force_residual.h"
 #include "nn/base/parallel.h"
 
@@ -27,12 +26,10 @@ void over_modelled_tracks(const Passes& passes,
                           const std::function<void()>& ended) {
   files::parallel_for(static_cast<int>(passes.flights.size()), passes.jobs, [&](int i) {
     const auto k = static_cast<std::size_t>(i);
-    if (passes.memory != nullptr) {
-      for (const KeptTrack& kept : passes.memory->tracks(passes, k)) use(k, kept.known);
-    } else {
-      for (const ModelledTrack& track : modelled_tracks(passes.inputs, passes.kind, passes.flights[k]))
-        use(k, track);
-    }
+    std::optional<std::vector<ModelledTrack>> own;
+    std::optional<std::vector<ModelledTrack>>& tracks = passes.known == nullptr ? own : (*passes.known)[k];
+    if (!tracks) tracks = modelled_tracks(passes.inputs, passes.kind, passes.flights[k]);
+    for (const ModelledTrack& track : *tracks) use(k, track);
     if (ended) ended();
   });
 }

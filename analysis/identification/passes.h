@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,7 +12,16 @@
 
 namespace swarmcert::identification {
 
-class ColumnMemory;
+/// A track with its model.
+struct ModelledTrack {
+  residuals::Track track;
+  stability::Model model;
+  std::vector<Eigen::Vector3d> residual_N;  ///< one per record, see residuals::force_residual()
+  TrackBlocks cut;
+};
+
+/// The tracks of flights, once a pass has read them.
+using KnownTracks = std::vector<std::optional<std::vector<ModelledTrack>>>;
 
 struct Passes {
   const residuals::Inputs& inputs;
@@ -20,16 +30,8 @@ struct Passes {
   std::size_t records = 0;
   int jobs = 0;
   residuals::Progress progress;
-  /// For these flights and models; null: each pass computes its columns again.
-  std::shared_ptr<ColumnMemory> memory = nullptr;
-};
-
-/// A track with its model.
-struct ModelledTrack {
-  residuals::Track track;
-  stability::Model model;
-  std::vector<Eigen::Vector3d> residual_N;  ///< one per record, see residuals::force_residual()
-  TrackBlocks cut;
+  /// Of `flights`; null: each pass reads them again.
+  std::shared_ptr<KnownTracks> known = nullptr;
 };
 
 /// Returns the tracks of vehicles of `kind` in a flight, without position-only ones.

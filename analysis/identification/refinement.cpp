@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "analysis/identification/box_least_squares.h"
-#include "analysis/identification/column_memory.h"
 #include "analysis/identification/covariance.h"
 #include "analysis/identification/remainder.h"
 #include "analysis/residuals/comparison.h"
@@ -445,22 +444,11 @@ bool has_memory(const std::vector<Refined>& refined) {
 
 }  // namespace
 
-std::vector<Refined> refine(const Passes& passes, const Grams& grams, const Members& members) {
-  if (members.empty()) return {};
+std::vector<Refined> refine(const Passes& passes, const std::vector<Start>& starts) {
+  if (starts.empty()) return {};
   Refinement refinement(passes);
-  std::vector<Candidate> candidates;
-  std::string start;
-  for (const Member& m : members) {
-    candidates.push_back(grams.candidates[static_cast<std::size_t>(m.candidate)]);
-    const Candidate& candidate = candidates.back();
-    refinement.add(candidate, candidate.thetas[static_cast<std::size_t>(m.theta)], Moves::kAll);
-    start += std::to_string(m.theta) + ' ';
-  }
-  if (passes.memory == nullptr) return refinement.run();
-  const auto [known, is_new] =
-      passes.memory->refinements.emplace(start + text_of(candidates), std::vector<Refined>());
-  if (is_new) known->second = refinement.run();
-  return known->second;
+  for (const Start& start : starts) refinement.add(start.candidate, start.theta, Moves::kAll);
+  return refinement.run();
 }
 
 std::vector<Refined> with_innovations(const Passes& passes, std::vector<Refined> refined) {

@@ -16,10 +16,16 @@ struct Refined {
   std::vector<Interval> linear_intervals, shape_intervals;
 };
 
-/// Refines `members` of `grams` jointly. Derivatives with respect to shapes are finite differences of columns. Steps
+/// An effect with the shape at which its refinement starts.
+struct Start {
+  Candidate candidate;
+  std::vector<double> theta;
+};
+
+/// Refines effects jointly. Derivatives with respect to shapes are finite differences of columns. Steps
 /// are bounded, and a weak regularisation towards the start keeps shapes in place on which the flights carry no
 /// information. Flights with more than 400 000 records get a single step.
-std::vector<Refined> refine(const Passes& passes, const Grams& grams, const Members& members);
+std::vector<Refined> refine(const Passes& passes, const std::vector<Start>& starts);
 
 /// Returns `refined` with the times of lags and delays fitted to the innovations of the residual (whitening.h), and
 /// everything else fitted again beside them. Returns `refined` unchanged without a lag or delay, or if the remainder is

@@ -22,6 +22,7 @@ class ConstantForce : public Effect {
   static EffectTraits traits() {
     EffectTraits traits;
     traits.family = Family::kPush;
+    traits.variables = {"heading"};  // what is constant in the body turns in the world
     return traits;
   }
   void columns(const Instant&, const double*, Wrench* columns) const override {

@@ -37,8 +37,7 @@ class Refinements : public testing::Test {
         inputs, "small", identification::every_flight(inputs), covered.records, 2, [](int, int) {}, nullptr};
     const identification::Candidate downwash =
         identification::candidate("downwash", inputs.models[0], covered);
-    const int middle = static_cast<int>(downwash.thetas.size() / 2);
-    return refine(passes, block_grams(passes, {downwash}), {{0, middle}}).at(0);
+    return refine(passes, {{downwash, downwash.thetas[downwash.thetas.size() / 2]}}).at(0);
   }
 
   std::filesystem::path folder_;

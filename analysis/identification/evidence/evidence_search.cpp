@@ -235,16 +235,24 @@ double EvidenceSearch::needed_bits(const Weighed& now) const {
   return std::max(kNamed_bits, kModelError * (data_.data_square() - now.left) / 2 / kNatsPerBit);
 }
 
-bool EvidenceSearch::shows_form(const Weighed& named, const Weighed& free) const {
-  constexpr double kLeft = 0.8;
-  return free.score > named.score + needed_bits(named) * kNatsPerBit && free.left < kLeft * named.left;
+bool EvidenceSearch::shows_form(const Weighed& named, std::size_t index, const Weighed& free) const {
+  constexpr double kLeft = 0.5, kOfEvidence = 1.0 / 8;
+  const double gained_bits = (free.score - named.score) / kNatsPerBit;
+  if (gained_bits < needed_bits(named)) return false;
+  const bool is_rest_noise = noise_beside(free.left) == 1;
+  return free.left < kLeft * named.left || (is_rest_noise && gained_bits > kOfEvidence * bits(named, index));
 }
 
 bool EvidenceSearch::may_follow(const Weighed& now, const Option& added) const {
   if (added.score < now.score + needed_bits(now) * kNatsPerBit) return false;
-  const bool is_form = std::any_of(now.set.begin(), now.set.end(),
-                                   [&](const Item& effect) { return is_form_of(all_, added.item, effect); });
-  return !is_form || shows_form(now, weigh(with(now.set, added.item)));
+  if (is_effect(all_, added.item)) return true;
+  const Weighed joined = weigh(with(now.set, added.item));
+  for (std::size_t i = 0; i < now.set.size(); ++i) {
+    if (!is_effect(all_, now.set[i])) continue;
+    const bool takes_name = is_form_of(all_, added.item, now.set[i]) || bits(joined, i) < needed_bits(joined);
+    if (takes_name && !shows_form(now, i, joined)) return false;
+  }
+  return true;
 }
 
 Set EvidenceSearch::changed(const Weighed& now, std::size_t index) const {
@@ -253,13 +261,12 @@ Set EvidenceSearch::changed(const Weighed& now, std::size_t index) const {
   const Weighed rest = weigh(without(now.set, index));
   const auto is_better = [&](const Option& other) {
     if (other.item == item) return false;
-    const bool loses_name = is_effect(all_, item) && !is_effect(all_, other.item);
     const Set exchanged = with(rest.set, other.item);
-    if (is_form_of(all_, other.item, item)) return shows_form(now, weigh(exchanged));
+    if (is_effect(all_, item) && !is_effect(all_, other.item))
+      return shows_form(now, index, weigh(exchanged));
     if (is_form_of(all_, item, other.item))
-      return may_follow(rest, other) && !shows_form(weigh(exchanged), now);
-    const double needed = loses_name ? needed_bits(now) : kExchanged_bits;
-    return other.score > now.score + needed * kNatsPerBit;
+      return may_follow(rest, other) && !shows_form(weigh(exchanged), rest.set.size(), now);
+    return other.score > now.score + kExchanged_bits * kNatsPerBit;
   };
   const std::vector<Option> others = options(rest.set);
   const auto other = std::find_if(others.begin(), others.end(), is_better);

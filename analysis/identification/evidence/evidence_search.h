@@ -15,8 +15,7 @@
 namespace swarmcert::evidence {
 
 /// An explanation is added if the set gains odds of 128 : 1, removed if it gains less, and exchanged if it gains 4 : 1.
-/// Effects are added before curves. A curve takes the place of an effect with the former odds; one over the variable of
-/// the effect, in its place or beside it, also has to leave a fifth less: no drag is exactly linear.
+/// Effects are added before curves. A curve takes the place of an effect only if it shows another form.
 inline constexpr double kNamed_bits = 7, kExchanged_bits = 2;
 /// Forces are modelled to about a percent. Beside a set, a ten-thousandth of its evidence is thus none.
 inline constexpr double kModelError = 1e-4;
@@ -51,8 +50,10 @@ class EvidenceSearch {
   /// Returns by how much the entry of the item at `index` raises the evidence of the set, in bits.
   double bits(const Weighed& best, std::size_t index) const;
   Weighed weigh(const Set& set) const;
-  /// Returns whether a set in which an effect has a free form explains clearly more than one in which it has its own.
-  bool shows_form(const Weighed& named, const Weighed& free) const;
+  /// Returns whether a set with a curve in the place of the effect at `index`, or with one over its variable beside it,
+  /// explains clearly more: it leaves half as much, or if what it leaves is noise, it gains an eighth of the evidence for
+  /// the effect. Else the name stands, for no drag is exactly linear.
+  bool shows_form(const Weighed& named, std::size_t index, const Weighed& free) const;
   /// Returns the size of one coefficient with which an item would raise the evidence of `set` by `bits` in 90 % of
   /// flights. With G = X'X of the item beside the set, the evidence rises as in weigh() by a quadratic function of the
   /// estimate, which scatters by 1/sqrt(G_kk) about the size. Signs of coefficients, worth up to a bit, are left out.
@@ -78,7 +79,8 @@ class EvidenceSearch {
   double log_likelihood(double left) const;
   /// Returns the bits by which an explanation has to raise the evidence of a set.
   double needed_bits(const Weighed& now) const;
-  /// Returns whether something may be added to a set.
+  /// Returns whether something may be added to a set: a curve that takes the name or the evidence of an effect only if it
+  /// shows another form.
   bool may_follow(const Weighed& now, const Option& added) const;
   /// Returns the set without the item at `index`, or with another in its place, if that is better.
   Set changed(const Weighed& now, std::size_t index) const;

@@ -7,6 +7,7 @@
 #include "analysis/identification/evidence/evidence_search.h"
 #include "analysis/identification/evidence/projection.h"
 #include "analysis/identification/evidence/shapes.h"
+
 namespace swarmcert::evidence {
 namespace {
 
@@ -58,7 +59,7 @@ bool is_refuted(const Hypotheses& all, const EvidenceSearch& search, const Weigh
     if (entry.kind != Kind::kCurve || !traits.varies_with(entry.variable)) continue;
     Set without = best.set;
     without.erase(without.begin() + static_cast<std::ptrdiff_t>(i));
-    if (search.shows_form(search.weigh(without), best)) return true;
+    if (search.shows_form(search.weigh(without), index - (i < index ? 1 : 0), best)) return true;
   }
   return false;
 }

@@ -132,6 +132,7 @@ Entry entry_of(const CurveOver& over, int first_column, double weight_N) {
 Entry entry_of_body(int first_column, double weight_N) {
   Entry entry;
   entry.name = "constant force of the body";
+  entry.variable = "heading";
   entry.kind = Kind::kCurve;
   entry.size = 3;
   entry.first_column = {first_column, first_column + 3};
