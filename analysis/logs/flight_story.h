@@ -43,7 +43,8 @@ std::vector<char> airborne(const Log& log);
 /// Finds limit cycles of roll or pitch in flight: four or more consecutive periods faster than 1 Hz, each tilting the
 /// thrust axis by at least 0.1 rad (a lateral acceleration of a tenth of g), with durations that agree within 30 %. A
 /// loop with a damping ratio of 0.1 or more would have lost nine tenths of its amplitude by then, and no trajectory is
-/// that regular.
+/// that regular. Not a limit cycle is one whose set point asks for half of that tilt at the same frequency, as an
+/// excitation of the position does. An excitation of attitude, rates or motors is in no set point of a Log: it counts.
 /// @param air whether the vehicle is airborne, per record
 std::vector<LogEvent> limit_cycles(const Log& log, const std::vector<char>& air);
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
 
 #include "analysis/logs/flight_story.h"
 #include "analysis/logs/statistics_of_series.h"
@@ -12,6 +13,8 @@ namespace {
 
 constexpr double kLeastTilt_rad = 0.1, kLeast_hz = 1, kSamePeriod = 0.3;
 constexpr std::size_t kLeastPeriods = 4;
+/// An oscillation whose set point asks for this share of its tilt is an excitation.
+constexpr double kAskedShare = 0.5;
 /// Half the rate amplitude of a kLeastTilt_rad oscillation at kLeast_hz; smaller excursions are ignored.
 constexpr double kLeastRate_rad_s = 0.5 * kLeastTilt_rad * 2 * kPi * kLeast_hz;
 
@@ -74,7 +77,26 @@ std::size_t end_of_run(const std::vector<Period>& periods, std::size_t first) {
   return end;
 }
 
-void add_cycles(const std::vector<Period>& periods, const char* axis, std::vector<LogEvent>& events) {
+/// Returns the tilt that the set point asks for at one frequency: the amplitude of its acceleration over that of
+/// gravity, along x or y. A Hann window leaves little of slower manoeuvres. 0 without set points.
+double asked_tilt_rad(const Log& log, double start_s, double length_s, double hz) {
+  if (!log.signals.targets) return 0;
+  std::complex<double> sums[2];
+  double weights = 0;
+  for (const Sample& sample : log.samples) {
+    const double t_s = 1e-6 * sample.time_us - start_s;
+    const Vector& v = sample.target_velocity_m_s;
+    if (t_s < 0 || t_s > length_s || !std::isfinite(v[0]) || !std::isfinite(v[1])) continue;
+    const double weight = 1 - std::cos(2 * kPi * t_s / length_s);
+    weights += weight;
+    for (std::size_t k = 0; k < 2; ++k) sums[k] += weight * v[k] * std::polar(1.0, -2 * kPi * hz * t_s);
+  }
+  if (weights == 0) return 0;
+  return 2 * kPi * hz * 2 * std::max(std::abs(sums[0]), std::abs(sums[1])) / weights / kGravity_m_s2;
+}
+
+void add_cycles(const Log& log, const std::vector<Period>& periods, const char* axis,
+                std::vector<LogEvent>& events) {
   std::size_t first = 0;
   while (first < periods.size()) {
     const std::size_t end = end_of_run(periods, first);
@@ -83,10 +105,11 @@ void add_cycles(const std::vector<Period>& periods, const char* axis, std::vecto
       for (std::size_t k = first; k < end; ++k)
         tilt_rad += periods[k].tilt_rad / static_cast<double>(end - first);
       const double length_s = periods[end - 1].start_s + periods[end - 1].length_s - periods[first].start_s;
-      events.push_back(
-          {"limit cycle", periods[first].start_s, length_s,
-           fmt::format("{} periods of {} at {:.2g} Hz, {:.2g} degrees to either side", end - first, axis,
-                       static_cast<double>(end - first) / length_s, tilt_rad * 180 / kPi)});
+      const double hz = static_cast<double>(end - first) / length_s;
+      if (asked_tilt_rad(log, periods[first].start_s, length_s, hz) < kAskedShare * tilt_rad)
+        events.push_back({"limit cycle", periods[first].start_s, length_s,
+                          fmt::format("{} periods of {} at {:.2g} Hz, {:.2g} degrees to either side",
+                                      end - first, axis, hz, tilt_rad * 180 / kPi)});
     }
     first = std::max(end, first + 1);
   }
@@ -106,7 +129,7 @@ std::vector<LogEvent> limit_cycles(const Log& log, const std::vector<char>& air)
       add_periods(log, first, i, axis, periods);
       first = i < log.samples.size() && air[i] != 0 ? i : i + 1;
     }
-    add_cycles(periods, axis == 0 ? "roll" : "pitch", events);
+    add_cycles(log, periods, axis == 0 ? "roll" : "pitch", events);
   }
   return events;
 }

@@ -69,6 +69,26 @@ TEST(LimitCycles, DampedOscillationsManoeuvresAndVibrationAreNone) {
               }).empty());
 }
 
+/// The events of a vehicle that rolls 0.15 rad at 2 Hz while its set point moves along y.
+std::vector<logs::LogEvent> cycles_with_set_point(const std::function<double(double)>& velocity_m_s) {
+  logs::Log log = rolling([](double t) { return t < 3 || t > 9 ? 0 : 0.15 * std::sin(kTwoPi * 2 * t); });
+  log.signals.targets = true;
+  for (logs::Sample& s : log.samples) s.target_velocity_m_s = {0, velocity_m_s(1e-6 * s.time_us), 0};
+  return logs::limit_cycles(log, std::vector<char>(log.samples.size(), 1));
+}
+
+TEST(LimitCycles, AnOscillationThatTheSetPointAsksForIsAnExcitation) {
+  const double most_m_s = 0.15 * 9.81 / (kTwoPi * 2);
+  const auto asked = [most_m_s](double share, double hz) {
+    return [=](double t) { return share * most_m_s * std::cos(kTwoPi * hz * t); };
+  };
+  EXPECT_TRUE(cycles_with_set_point(asked(1, 2)).empty());
+  EXPECT_TRUE(cycles_with_set_point(asked(0.7, 2)).empty()) << "the loop amplifies it";
+  EXPECT_EQ(cycles_with_set_point(asked(0.2, 2)).size(), 1u) << "too little to be its cause";
+  EXPECT_EQ(cycles_with_set_point(asked(8, 0.4)).size(), 1u) << "a slalom beside a limit cycle";
+  EXPECT_EQ(cycles_with_set_point([](double) { return 0.0; }).size(), 1u);
+}
+
 TEST(LimitCycles, OfTheFlightsThatOscillateAreFoundAndOfTheirRepetitionNot) {
   SWARMCERT_NEEDS_DATA();
   // According to independent scripts, 29, 76, 113, 119 and 146 oscillate, and 113_2 with the same gains does not. So do
