@@ -77,9 +77,9 @@ void put(std::string& bytes, std::size_t offset, const T& value) {
   std::memcpy(bytes.data() + offset, &value, sizeof value);
 }
 
-template <std::size_t n>
-void put_all(std::string& bytes, std::size_t offset, const std::array<float, n>& values) {
-  for (std::size_t i = 0; i < n; ++i) put(bytes, offset + 4 * i, values[i]);
+template <std::size_t kN>
+void put_all(std::string& bytes, std::size_t offset, const std::array<float, kN>& values) {
+  for (std::size_t i = 0; i < kN; ++i) put(bytes, offset + 4 * i, values[i]);
 }
 
 /// Instruction B.W from `at` to `to`.

@@ -54,9 +54,9 @@ class FlightWriter {
 
  private:
   float within(float range) { return range * static_cast<float>(random_.symmetric()); }
-  template <std::size_t n>
-  std::array<float, n> vector(float range) {
-    std::array<float, n> x;
+  template <std::size_t kN>
+  std::array<float, kN> vector(float range) {
+    std::array<float, kN> x;
     for (float& one : x) one = within(range);
     return x;
   }

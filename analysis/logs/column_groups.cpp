@@ -7,9 +7,20 @@
 
 #include "analysis/logs/message_frames.h"
 #include "analysis/logs/statistics_of_series.h"
+#include "nn/base/text.h"
 
 namespace swarmcert::logs {
 namespace {
+
+/// Reads a name beside the others of its table: "x_r" is the set point of "x". Alone, an r is as often a radius, a
+/// rate or a right motor.
+NameReading read_beside(const std::vector<RawColumn>& columns, const std::string& name) {
+  if (!files::ends_with(name, "_r")) return read_name(name);
+  const std::string measured = name.substr(0, name.size() - 2);
+  const bool is_set_point = std::any_of(columns.begin(), columns.end(),
+                                        [&](const RawColumn& column) { return column.name == measured; });
+  return read_name(is_set_point ? measured + "_ref" : name);
+}
 
 class Grouping {
  public:
@@ -17,7 +28,7 @@ class Grouping {
       : topic_(topic), grouped_(log.topics[topic].columns.size(), 0) {
     const std::vector<RawColumn>& columns = log.topics[topic].columns;
     for (std::size_t c = 0; c < columns.size(); ++c) {
-      readings_.push_back(read_name(columns[c].name));
+      readings_.push_back(read_beside(columns, columns[c].name));
       if (taken[c] != 0 || (!columns[c].values.empty() && !holds_numbers(columns[c].values))) {
         grouped_[c] = 1;
         continue;

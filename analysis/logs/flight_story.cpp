@@ -11,7 +11,8 @@
 namespace swarmcert::logs {
 namespace {
 
-constexpr double kIdleShare = 0.3;  // of the typical thrust of a log
+constexpr double kIdleShare = 0.3;      // of the typical thrust of a log
+constexpr double kLeastCommand = 0.02;  // of a motor that carries a vehicle
 constexpr double kAboveStanding_m = 0.03;
 constexpr double kShortestFlight_s = 0.5, kShortestPause_s = 0.3, kLongestTakeoff_s = 3;
 constexpr double kNoThrustHeight_m = 0.15;
@@ -26,6 +27,17 @@ std::vector<double> thrust_of(const Log& log) {
     thrust.push_back(log.signals.thrust == ThrustSource::kDuty ? s.duty[0] + s.duty[1] + s.duty[2] + s.duty[3]
                                                                : s.given_thrust);
   return thrust;
+}
+
+/// Returns whether the commands of the motors, whose sum is typically `common`, are too small to carry any vehicle. If
+/// it climbs nevertheless, their unit is another one.
+bool are_motors_off(const Log& log, double common) {
+  constexpr double kClimb_m = 0.2;
+  const double command = log.signals.thrust == ThrustSource::kDuty ? common / 4 : log.hover_command;
+  const auto [low, high] =
+      std::minmax_element(log.samples.begin(), log.samples.end(),
+                          [](const Sample& a, const Sample& b) { return a.position_m[2] < b.position_m[2]; });
+  return command < kLeastCommand && !(high->position_m[2] - low->position_m[2] > kClimb_m);
 }
 
 /// Inverts runs of `value` that are shorter than `shortest_s`, except at the ends of the log.
@@ -190,8 +202,9 @@ std::vector<char> airborne(const Log& log) {
   const std::vector<double> thrust = thrust_of(log);
   const double common = thrust.empty() ? 0 : quantile_of(thrust, 0.75);
   for (std::size_t i = 0; i < n && !thrust.empty(); ++i) idle[i] = !(thrust[i] > kIdleShare * common) ? 1 : 0;
-  if (!thrust.empty() && !(common > 0)) idle.assign(n, 1);
-  if (thrust.empty() && log.signals.position && n > 0) {
+  const bool is_off = n > 0 && are_motors_off(log, common);
+  if (is_off || (!thrust.empty() && !(common > 0))) idle.assign(n, 1);
+  if (!is_off && thrust.empty() && log.signals.position && n > 0) {
     // Without thrust, the vehicle is considered airborne while it is clearly above the lowest heights of the log.
     std::vector<double> heights;
     for (const Sample& s : log.samples) heights.push_back(s.position_m[2]);

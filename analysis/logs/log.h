@@ -169,7 +169,7 @@ struct Log {
   std::vector<LogEvent> events;  ///< of single columns: wraps and saturation of integers
   /// What was decided from the data rather than from names, and why.
   std::vector<std::string> interpretation;
-  /// Mean command of a motor while it carries the weight, if Signals::thrust is kHoverMultiple; else NaN.
+  /// Mean command of a motor while it carries the weight, if Signals::thrust is kHoverMultiple; 0: none ran; else NaN.
   double hover_command = std::numeric_limits<double>::quiet_NaN();
   /// Motor thrust is proportional to this power of the command, 1 or 2; used if Signals::motor_commands is not 0.
   int motor_power = 1;

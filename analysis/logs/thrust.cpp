@@ -66,6 +66,7 @@ void set_hover_multiple(Draft& draft, const Rotors& rotors, bool squares_only, c
   const bool is_square = squares_only || of_square.scatter < of_linear.scatter;
   const HoverScale& scale = is_square ? of_square : of_linear;
   if (!(scale.hover > 0)) {
+    if (quantile_of(linear, 1) <= 0) draft.log.hover_command = 0;
     draft.add("thrust", Source::kMissing, "", "N");
     return;
   }

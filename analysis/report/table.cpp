@@ -84,7 +84,7 @@ std::string cell(const Node& value, const char* format, double factor) {
   if (const std::string* text = std::get_if<std::string>(&value.value)) return *text;
   std::string words;
   for (const Node& member : value.members)
-    words += (words.empty() ? "" : ", ") + (value.kind == Node::Kind::map ? member.name + " " : "") +
+    words += (words.empty() ? "" : ", ") + (value.kind == Node::Kind::kMap ? member.name + " " : "") +
              cell(member, format, factor);
   return words.empty() ? "-" : words;
 }

@@ -62,7 +62,7 @@ inline Node shape_of_table(const KeysOfTable& table) {
   Record record(shape, true);
   Keys keys(record);
   table(keys);
-  shape.kind = Node::Kind::fields;  // also without keys
+  shape.kind = Node::Kind::kFields;  // also without keys
   return shape;
 }
 

@@ -27,15 +27,15 @@ Json scalar_json(const Node& node) {
 
 const char* type_name(Node::Kind kind) {
   switch (kind) {
-    case Node::Kind::flag:
+    case Node::Kind::kFlag:
       return "boolean";
-    case Node::Kind::integer:
+    case Node::Kind::kInteger:
       return "integer";
-    case Node::Kind::number:
+    case Node::Kind::kNumber:
       return "number";
-    case Node::Kind::text:
+    case Node::Kind::kText:
       return "string";
-    case Node::Kind::list:
+    case Node::Kind::kList:
       return "array";
     default:
       return "object";
@@ -52,22 +52,22 @@ class SchemaWriter {
     if (*shape.about.meaning != '\0') schema["description"] = shape.about.meaning;
     if (*shape.about.unit != '\0') schema["unit"] = shape.about.unit;
     if (*shape.about.guarantee != '\0') schema["guarantee"] = shape.about.guarantee;
-    if (shape.kind == Node::Kind::any) return schema;
-    if (shape.kind == Node::Kind::one_of) {
+    if (shape.kind == Node::Kind::kAny) return schema;
+    if (shape.kind == Node::Kind::kOneOf) {
       for (const Node& alternative : shape.members) schema["anyOf"].push_back(of(alternative));
       return schema;
     }
     add_type(shape, schema);
-    if (shape.kind == Node::Kind::fields) add_fields(shape, schema);
-    if (shape.kind == Node::Kind::map) schema["additionalProperties"] = of(shape.members.at(0));
-    if (shape.kind == Node::Kind::list) schema["items"] = of(shape.members.at(0));
+    if (shape.kind == Node::Kind::kFields) add_fields(shape, schema);
+    if (shape.kind == Node::Kind::kMap) schema["additionalProperties"] = of(shape.members.at(0));
+    if (shape.kind == Node::Kind::kList) schema["items"] = of(shape.members.at(0));
     if (shape.size > 0) schema["minItems"] = schema["maxItems"] = shape.size;
     return schema;
   }
 
  private:
   void add_type(const Node& shape, Json& schema) const {
-    const bool may_be_null = shape.may_be_null || (numbers_may_be_null_ && shape.kind == Node::Kind::number);
+    const bool may_be_null = shape.may_be_null || (numbers_may_be_null_ && shape.kind == Node::Kind::kNumber);
     if (shape.choices.size() == 1 && !may_be_null) {
       schema["const"] = shape.choices[0];
       return;
@@ -116,7 +116,7 @@ const Node* Node::find(std::string_view path) const {
 void Record::object(const char* name, const char* meaning,
                     const std::function<void(Record&)>& describe_fields) {
   Record inner = add(name, {meaning, "", ""});
-  inner.begin(Node::Kind::fields);
+  inner.begin(Node::Kind::kFields);
   describe_fields(inner);
 }
 
@@ -148,15 +148,15 @@ void Record::constant(const char* name, const std::string& text, const char* mea
 }
 
 void Record::put(const nlohmann::ordered_json& json) {
-  node_->kind = Node::Kind::any;
+  node_->kind = Node::Kind::kAny;
   if (is_shape_) return;
   if (json.is_boolean()) return put_flag(json.get<bool>());
   if (json.is_number_unsigned()) return put_unsigned(json.get<std::uint64_t>());
   if (json.is_number_integer()) return put_integer(json.get<std::int64_t>());
   if (json.is_number()) return put_number(json.get<double>());
   if (json.is_string()) return put_text(json.get_ref<const std::string&>());
-  if (json.is_array()) begin(Node::Kind::list);
-  if (json.is_object()) begin(Node::Kind::map);
+  if (json.is_array()) begin(Node::Kind::kList);
+  if (json.is_object()) begin(Node::Kind::kMap);
   for (const auto& [key, member] : json.items()) (json.is_array() ? element() : entry(key)).put(member);
 }
 
@@ -174,7 +174,7 @@ Record Record::add(const char* name, const About& about) {
   for (const Node& member : node_->members) {
     if (member.name == name) throw std::logic_error(std::string("field described twice: ") + name);
   }
-  begin(Node::Kind::fields);
+  begin(Node::Kind::kFields);
   Record inner = entry(name);
   inner.node_->about = about;
   return inner;
@@ -192,32 +192,32 @@ Record Record::entry(const std::string& key) {
 }
 
 void Record::put_flag(bool value) {
-  begin(Node::Kind::flag);
+  begin(Node::Kind::kFlag);
   node_->value = value;
 }
 
 void Record::put_integer(std::int64_t value) {
-  begin(Node::Kind::integer);
+  begin(Node::Kind::kInteger);
   node_->value = value;
 }
 
 void Record::put_unsigned(std::uint64_t value) {
-  begin(Node::Kind::integer);
+  begin(Node::Kind::kInteger);
   node_->value = value;
 }
 
 void Record::put_number(double value) {
-  begin(Node::Kind::number);
+  begin(Node::Kind::kNumber);
   node_->value = value;
 }
 
 void Record::put_text(std::string_view value) {
-  begin(Node::Kind::text);
+  begin(Node::Kind::kText);
   node_->value = std::string(value);
 }
 
 void Record::choose(std::size_t index, std::vector<std::string> names) {
-  begin(Node::Kind::text);
+  begin(Node::Kind::kText);
   node_->value = names.at(index);
   if (is_shape_) node_->choices = std::move(names);
 }
@@ -230,13 +230,13 @@ std::vector<std::string> field_names(const Node& shape) {
 
 Json to_json(const Node& value) {
   switch (value.kind) {
-    case Node::Kind::fields:
-    case Node::Kind::map: {
+    case Node::Kind::kFields:
+    case Node::Kind::kMap: {
       Json object = Json::object();
       for (const Node& member : value.members) object[member.name] = to_json(member);
       return object;
     }
-    case Node::Kind::list: {
+    case Node::Kind::kList: {
       Json array = Json::array();
       for (const Node& member : value.members) array.push_back(to_json(member));
       return array;

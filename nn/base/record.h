@@ -32,18 +32,18 @@ const char* interned(const std::string& text);
 
 /// One described value, or, in a shape, the type of one: lists and maps then have one member, the shape of all.
 struct Node {
-  enum class Kind : std::uint8_t { any, flag, integer, number, text, fields, list, map, one_of };
+  enum class Kind : std::uint8_t { kAny, kFlag, kInteger, kNumber, kText, kFields, kList, kMap, kOneOf };
 
   std::string name;  ///< of the field or map entry; empty in lists
   About about;
-  Kind kind = Kind::any;
+  Kind kind = Kind::kAny;
   bool may_be_null = false;
   bool may_be_absent = false;
   std::size_t size = 0;  ///< of a list whose length is part of its type; 0: any length
   /// Scalars only; monostate: null. Numbers that are not finite are null in JSON.
   std::variant<std::monostate, bool, std::int64_t, std::uint64_t, double, std::string> value;
   std::vector<std::string> choices;  ///< all values that a text may have; empty: any text
-  std::vector<Node> members;         ///< fields in order, elements, entries, or the alternatives of one_of
+  std::vector<Node> members;         ///< fields in order, elements, entries, or the alternatives of kOneOf
 
   /// Returns the member at a dotted path ("max.x"); nullptr if there is none.
   const Node* find(std::string_view path) const;
@@ -89,10 +89,10 @@ class Record {
   template <class T, class Describe>
   void list(const char* name, const std::vector<T>& items, const char* meaning, Describe describe_one) {
     Record all = add(name, {meaning, "", ""});
-    all.begin(Node::Kind::list);
+    all.begin(Node::Kind::kList);
     const auto add_element = [&](const T& item) {
       Record one = all.element();
-      one.begin(Node::Kind::fields);
+      one.begin(Node::Kind::kFields);
       describe_one(one, item);
     };
     if (is_shape_) return add_element(T{});
@@ -116,10 +116,10 @@ class Record {
   void entries(const char* name, const std::vector<std::pair<std::string, T>>& items, const char* meaning,
                Describe describe_one) {
     Record all = add(name, {meaning, "", ""});
-    all.begin(Node::Kind::map);
+    all.begin(Node::Kind::kMap);
     const auto add_entry = [&](const std::string& key, const T& item) {
       Record one = all.entry(key);
-      one.begin(Node::Kind::fields);
+      one.begin(Node::Kind::kFields);
       describe_one(one, item);
     };
     if (is_shape_) return add_entry("", T{});
@@ -150,7 +150,7 @@ class Record {
     else if constexpr (std::is_convertible_v<T, std::string_view>)
       put_text(value);
     else {
-      begin(Node::Kind::fields);
+      begin(Node::Kind::kFields);
       describe(*this, value);
     }
   }
@@ -161,35 +161,35 @@ class Record {
   }
   template <class T>
   void put(const std::vector<T>& values) {
-    begin(Node::Kind::list);
+    begin(Node::Kind::kList);
     if (is_shape_) return element().put(values.empty() ? T{} : values.front());
     reserve(values.size());
     for (const T& value : values) element().put(value);
   }
-  template <class T, std::size_t n>
-  void put(const std::array<T, n>& values) {
-    begin(Node::Kind::list);
-    node_->size = n;
+  template <class T, std::size_t kN>
+  void put(const std::array<T, kN>& values) {
+    begin(Node::Kind::kList);
+    node_->size = kN;
     if (is_shape_) return element().put(T{});
     for (const T& value : values) element().put(value);
   }
   template <class T>
   void put(const std::map<std::string, T>& entries) {
-    begin(Node::Kind::map);
+    begin(Node::Kind::kMap);
     if (is_shape_) return entry("").put(entries.empty() ? T{} : entries.begin()->second);
     for (const auto& [key, value] : entries) entry(key).put(value);
   }
   /// Entries in the order given.
   template <class T>
   void put(const std::vector<std::pair<std::string, T>>& entries) {
-    begin(Node::Kind::map);
+    begin(Node::Kind::kMap);
     if (is_shape_) return entry("").put(T{});
     for (const auto& [key, value] : entries) entry(key).put(value);
   }
   template <class... T>
   void put(const std::variant<T...>& value) {
     if (!is_shape_) return std::visit([this](const auto& held) { put(held); }, value);
-    begin(Node::Kind::one_of);
+    begin(Node::Kind::kOneOf);
     (element().put(T{}), ...);
   }
   /// [lower, upper].

@@ -117,9 +117,10 @@ class Quantities {
 };
 
 std::string limit_text(const GridLimit& limit, double value) {
+  if (std::isnan(value)) return limit.quantity + " is undefined";
   const bool is_below = value < limit.least;
-  return limit.quantity + " " + decimals(value) + (is_below ? " is below " : " is above ") +
-         decimals(is_below ? limit.least : limit.most);
+  return limit.quantity + (is_below ? " is below " : " is above ") +
+         decimals(is_below ? limit.least : limit.most) + ": " + decimals(value);
 }
 
 /// Returns an empty text if the rotors can lift the vehicle.
@@ -155,7 +156,8 @@ Cell compute_cell(const Grid& grid, long index) {
   if (cell.infeasible.empty() && std::isfinite(grid.disturbance.amplitude_N)) {
     const Saturation& thrust = quantities.thrust();
     if (!thrust.is_proved())
-      cell.infeasible = "the thrust is " + decimals(-thrust.margin_N()) + " N short under the disturbance";
+      cell.infeasible = "the thrust is not proved to suffice under the disturbance: up to " +
+                        decimals(-thrust.margin_N()) + " N short";
   }
   for (const GridLimit& limit : grid.limits) {
     if (!cell.infeasible.empty()) break;

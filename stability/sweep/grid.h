@@ -70,7 +70,8 @@ Grid load_grid(const std::string& path);
 struct Cell {
   long index = 0;
   std::vector<double> values;  ///< of grid.compute, in that order; NaN if undefined
-  std::string infeasible;      ///< why the cell is infeasible; empty if feasible
+  /// Why the cell is infeasible, "REASON" or "REASON: the values of this cell"; empty if feasible.
+  std::string infeasible;
 };
 
 /// Computes one cell. The result depends on nothing but the grid and the index.

@@ -355,6 +355,18 @@ TEST(Inspect, ReportIsAPageOnPhasesEventsSignalsAndWhatToLog) {
       << "the page is not replaced without --force";
 }
 
+TEST(Inspect, SuggestsAModelDraftOnlyForALogInWhichTheVehicleFlew) {
+  const ScratchFolder folder;
+  const std::string flight = hexacopter_csv(1);
+  write_text(folder / "flight.csv", flight);
+  write_text(folder / "ground.csv", flight.substr(0, flight.find("\n2.000,") + 1));
+  const Outcome flew = run_shell("swarmcert inspect flight.csv", folder.path());
+  EXPECT_NE(flew.output.find("model draft flight.csv"), std::string::npos) << flew.output;
+  const Outcome stood = run_shell("swarmcert inspect ground.csv", folder.path());
+  EXPECT_NE(stood.output.find("no flight: stands on the ground"), std::string::npos) << stood.output;
+  EXPECT_EQ(stood.output.find("model draft"), std::string::npos) << stood.output;
+}
+
 TEST(Inspect, ReportOnAFolderNamesItOnceAndLogsWithinIt) {
   const ScratchFolder folder;
   std::filesystem::create_directories(folder.path() / "some/flights");

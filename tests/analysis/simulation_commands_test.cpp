@@ -1,8 +1,10 @@
 // spacing compared with simulation, sweep when interrupted and on a cluster, iss-check and simulate as a user runs
 // them.
+#include <fmt/core.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <map>
 
 #include "analysis/run.h"
 #include "nn/base/json.h"
@@ -172,6 +174,26 @@ TEST(SweepCommand, CellsWhereTheThrustDoesNotSufficeAreInfeasibleWithTheReason) 
   EXPECT_GT(cannot_hover, 0);
   EXPECT_GT(too_weak, 0);
   EXPECT_GT(feasible, 0);
+}
+
+TEST(SweepCommand, InfeasibleCellsAreCountedByReasonWithoutTheValuesOfEachCell) {
+  const ScratchFolder folder;
+  write_sweep(folder, 5);
+  write_text(folder / "grid.toml",
+             read_text(folder / "grid.toml") + "[limits.noise_command_m_s2]\nmost = 0.14\n");
+  const Outcome sweep = run_shell("swarmcert sweep grid.toml -o out", folder.path());
+  ASSERT_EQ(sweep.exit_code, 0) << sweep.output;
+  std::map<std::string, int> lines;
+  const Json points = files::parse_json(read_text(folder / "out/sweep.json"), "sweep.json")["points"];
+  for (const Json& point : points) ++lines[std::string(point["reason"]).substr(0, 20)];
+  lines.erase("");
+  ASSERT_EQ(lines.count("noise_command_m_s2 i"), 1);
+  for (const auto& [reason, count] : lines)
+    EXPECT_NE(sweep.output.find(fmt::format("  {:>7} infeasible: {}", count, reason)), std::string::npos)
+        << sweep.output;
+  for (const char* whole : {": noise_command_m_s2 is above 0.14\n", ": the rotors cannot lift the vehicle\n",
+                            ": the thrust is not proved to suffice under the disturbance\n"})
+    EXPECT_NE(sweep.output.find(whole), std::string::npos) << sweep.output;
 }
 
 TEST(SweepCommand, AJobArrayOnARealSlurmMergesToTheBytesOfAnUndividedRun) {

@@ -107,6 +107,21 @@ TEST(ColumnMeaning, WhatTheMotionContradictsIsNotUsedAndSaid) {
   EXPECT_EQ(source(log, "specific_force").find("ang_acc"), std::string::npos);
 }
 
+TEST(ColumnMeaning, AnRBehindTheNameOfAnotherColumnMeansItsSetPoint) {
+  const auto ahead_of = [](const auto& of) {
+    return [of](const Flight& f) { return of(Flight{f.t + 0.1}); };
+  };
+  const Vector3 wished = {axes("", "_r"), ahead_of(position)},
+                wished_v = {axes("v", "_r"), ahead_of(velocity)};
+  const logs::Log log = read(table({{axes(""), position}, {axes("v"), velocity}, wished, wished_v}));
+  EXPECT_LT(error_of(log), 1e-5) << "the set points are not taken for the vehicle";
+  EXPECT_TRUE(log.signals.targets);
+  EXPECT_EQ(source(log, "target_position"), "x_r, y_r, z_r");
+  EXPECT_EQ(source(log, "target_velocity"), "vx_r, vy_r, vz_r");
+  EXPECT_FALSE(read(table({{axes("", "_r"), position}, {axes("v"), velocity}})).signals.targets)
+      << "no column that these would be the set points of";
+}
+
 TEST(ColumnMeaning, WrappedClocksGoOn) {
   const std::vector<Vector3> groups = {{axes(""), position}, {axes("v"), velocity}};
   // 2^24 and 2^32 milliseconds, 2^32 microseconds; the clock wraps after 3 s.

@@ -108,6 +108,30 @@ TEST(LimitCycles, OfTheFlightsThatOscillateAreFoundAndOfTheirRepetitionNot) {
                                             "log78"}));
 }
 
+/// Returns a log of 10 s in which the motors have `duty` and the vehicle climbs by `climb_m`.
+logs::Log driven(double duty, double climb_m) {
+  logs::Log log;
+  log.signals.thrust = logs::ThrustSource::kDuty;
+  log.signals.position = true;
+  for (int k = 0; k < 1000; ++k) {
+    logs::Sample s;
+    s.time_us = 1e4 * k;
+    s.duty.fill(duty);
+    s.position_m[2] = 0.3 + climb_m * k / 1000;
+    log.samples.push_back(s);
+  }
+  return log;
+}
+
+TEST(FlightStory, MotorsThatBarelyTurnCarryNoVehicle) {
+  for (const double duty : {0.0, 0.001, 0.01}) {
+    EXPECT_EQ(logs::tell(driven(duty, 0)).air_s, 0) << duty;
+    EXPECT_FALSE(logs::tell(driven(duty, 0)).no_flight.empty()) << duty;
+  }
+  EXPECT_GT(logs::tell(driven(0.4, 0)).air_s, 9) << "a hover throughout";
+  EXPECT_GT(logs::tell(driven(0.004, 1)).air_s, 9) << "a flight whose duty has another unit";
+}
+
 logs::RawLog with_receiver(const std::string& topic, const std::vector<std::string>& names,
                            const std::vector<std::vector<double>>& rows) {
   logs::RawLog raw;

@@ -127,7 +127,7 @@ void add_fields(const std::string& word, bool by_name, std::vector<GlossaryEntry
   std::map<std::string, std::size_t> known;  // by meaning, which several results share
   for_each_described_field([&](const files::Node& field, const std::string& place) {
     const bool fits = by_name ? field.name == word
-                              : is_value(field, word) || (field.kind == files::Node::Kind::text &&
+                              : is_value(field, word) || (field.kind == files::Node::Kind::kText &&
                                                           mentions(field.about.meaning, word));
     if (!fits || *field.about.meaning == '\0') return;
     const auto [found, is_new] = known.emplace(field.about.meaning, entries.size());

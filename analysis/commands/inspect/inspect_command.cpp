@@ -244,7 +244,10 @@ int run_inspect(InspectOptions options, const CommonOptions& common) {
     if (common.prints_text()) fmt::print("Report: {}\n", page);
   }
   write_result(common, described);
-  if (!outcomes.empty() && outcomes.size() == num_readable) print_next_of_logs(options, common);
+  const std::vector<const LogFile*> inspected = logs_of(result);
+  const bool any_flew = std::any_of(inspected.begin(), inspected.end(),
+                                    [](const LogFile* log) { return log->story.no_flight.empty(); });
+  if (any_flew && outcomes.size() == num_readable) print_next_of_logs(options, common);
   return num_readable == paths.size() ? kDone : kBadInput;
 }
 

@@ -318,9 +318,10 @@ void describe(Record& record, const LogFile& file) {
     judged.field("torque", torque_axes(log.signals), "Axes of the body.");
   });
   record.field("judged_torque", name(log.signals.torque), "none, mean in slow flight or dynamic.");
-  record.field("hover_command", log.hover_command,
-               "Mean command of a motor that carries the weight; null where thrust has another source.", "",
-               "estimate");
+  record.field(
+      "hover_command", log.hover_command,
+      "Mean command of a motor that carries the weight; 0: none ran; null: thrust has another source.", "",
+      "estimate");
   record.list("missing", story.missing, "Signals to log next time.", describe_missing);
   record.list("phases", story.phases, "In order of time.", describe_phase);
   record.list("events", story.events, "In order of time.", describe_event);

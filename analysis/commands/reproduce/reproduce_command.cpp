@@ -97,7 +97,7 @@ void describe_any(files::Record& record) {
     files::Node any = shared.shapes[0];
     if (shared.shapes.size() > 1) {
       any = {};
-      any.kind = files::Node::Kind::one_of;
+      any.kind = files::Node::Kind::kOneOf;
       any.members = shared.shapes;
     }
     const files::About& about = any.about;

@@ -37,16 +37,11 @@ std::string where(const MergedSweep& sweep, const Cell& cell) {
   return text;
 }
 
-/// The number of infeasible cells by reason, with the numbers removed from the reason.
+/// The number of infeasible cells by reason, without the values of each cell.
 std::map<std::string, int> reasons(const MergedSweep& sweep) {
   std::map<std::string, int> result;
-  for (const Cell& cell : sweep.cells) {
-    if (cell.infeasible.empty()) continue;
-    const std::size_t number = cell.infeasible.find_first_of("0123456789");
-    std::string reason = cell.infeasible.substr(0, number);
-    while (!reason.empty() && (reason.back() == ' ' || reason.back() == '-')) reason.pop_back();
-    ++result[reason];
-  }
+  for (const Cell& cell : sweep.cells)
+    if (!cell.infeasible.empty()) ++result[cell.infeasible.substr(0, cell.infeasible.find(": "))];
   return result;
 }
 
