@@ -260,12 +260,11 @@ Set EvidenceSearch::changed(const Weighed& now, std::size_t index) const {
   if (bits(now, index) < needed_bits(now)) return without(now.set, index);
   const Weighed rest = weigh(without(now.set, index));
   const auto is_better = [&](const Option& other) {
-    if (other.item == item) return false;
+    if (other.item == item || !may_follow(rest, other)) return false;
     const Set exchanged = with(rest.set, other.item);
     if (is_effect(all_, item) && !is_effect(all_, other.item))
       return shows_form(now, index, weigh(exchanged));
-    if (is_form_of(all_, item, other.item))
-      return may_follow(rest, other) && !shows_form(weigh(exchanged), rest.set.size(), now);
+    if (is_form_of(all_, item, other.item)) return !shows_form(weigh(exchanged), rest.set.size(), now);
     return other.score > now.score + kExchanged_bits * kNatsPerBit;
   };
   const std::vector<Option> others = options(rest.set);
