@@ -24,8 +24,7 @@ std::vector<std::string> left_sentences(const identification::Diagnosis& diagnos
                                         const residuals::ForceUnit& unit);
 
 /// What the sizes of Diagnosis::detectable are.
-inline constexpr char kDetectableWords[] =
-    "Smallest sizes that 9 of 10 flights like these would have shown";
+inline constexpr char kDetectableWords[] = "Smallest sizes that 9 of 10 flights like these would have shown";
 
 /// Describes what the ranking of `difference` is based on.
 std::string in_words(const identification::Difference& difference);

@@ -54,11 +54,12 @@ void describe(Record& record, const Ranked& entry) {
   record.field("model_form", entry.model_form,
                "Range of each coefficient over fits without a part of the data.");
   record.field("instrument", entry.instrument, "The check of each coefficient by set points.");
-  record.field("evidence_bits", entry.evidence_bits,
-               "Logarithm of the odds of the best explanation with it over the best without it. Of an effect "
-               "that was not searched: from the Wald statistic, which is robust to errors correlated over 2 s, "
-               "less what its parameters cost (Schwarz). null: not known.",
-               "bit", "estimate");
+  record.field(
+      "evidence_bits", entry.evidence_bits,
+      "Logarithm of the odds of the best explanation with it over the best without it. Of an effect "
+      "that was not searched: from the Wald statistic, which is robust to errors correlated over 2 s, "
+      "less what its parameters cost (Schwarz). null: not known.",
+      "bit", "estimate");
   record.list("alternatives", alternatives_of(entry), "What could stand in its place.",
               [](Record& r, const Alternative& other) {
                 r.field("names", other.names, "What no flight tells apart from each other.");

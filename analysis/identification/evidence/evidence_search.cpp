@@ -236,11 +236,13 @@ double EvidenceSearch::needed_bits(const Weighed& now) const {
 }
 
 bool EvidenceSearch::shows_form(const Weighed& named, std::size_t index, const Weighed& free) const {
-  constexpr double kLeft = 0.5, kOfEvidence = 1.0 / 8;
+  constexpr double kLeft = 0.75, kLeftByForm = 0.5, kOfEvidence = 1.0 / 8;
   const double gained_bits = (free.score - named.score) / kNatsPerBit;
   if (gained_bits < needed_bits(named)) return false;
+  const bool is_form = is_form_of(all_, free.set.back(), named.set[index]);
   const bool is_rest_noise = noise_beside(free.left) == 1;
-  return free.left < kLeft * named.left || (is_rest_noise && gained_bits > kOfEvidence * bits(named, index));
+  return free.left < (is_form ? kLeftByForm : kLeft) * named.left ||
+         (is_rest_noise && gained_bits > kOfEvidence * bits(named, index));
 }
 
 bool EvidenceSearch::may_follow(const Weighed& now, const Option& added) const {

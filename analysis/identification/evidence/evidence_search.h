@@ -50,9 +50,9 @@ class EvidenceSearch {
   /// Returns by how much the entry of the item at `index` raises the evidence of the set, in bits.
   double bits(const Weighed& best, std::size_t index) const;
   Weighed weigh(const Set& set) const;
-  /// Returns whether a set with a curve in the place of the effect at `index`, or with one over its variable beside it,
-  /// explains clearly more: it leaves half as much, or if what it leaves is noise, it gains an eighth of the evidence for
-  /// the effect. Else the name stands, for no drag is exactly linear.
+  /// Returns whether a set that ends with a curve, in the place of the effect at `index` or beside it, explains clearly
+  /// more: it leaves a quarter less, or half as much if the curve is over the variable of the effect, for no drag is
+  /// exactly linear; or if what it leaves is noise, it gains an eighth of the evidence for the effect.
   bool shows_form(const Weighed& named, std::size_t index, const Weighed& free) const;
   /// Returns the size of one coefficient with which an item would raise the evidence of `set` by `bits` in 90 % of
   /// flights. With G = X'X of the item beside the set, the evidence rises as in weigh() by a quadratic function of the
@@ -79,8 +79,8 @@ class EvidenceSearch {
   double log_likelihood(double left) const;
   /// Returns the bits by which an explanation has to raise the evidence of a set.
   double needed_bits(const Weighed& now) const;
-  /// Returns whether something may be added to a set: a curve that takes the name or the evidence of an effect only if it
-  /// shows another form.
+  /// Returns whether something may be added to a set: a curve that takes the name or the evidence of an effect only if
+  /// it shows another form.
   bool may_follow(const Weighed& now, const Option& added) const;
   /// Returns the set without the item at `index`, or with another in its place, if that is better.
   Set changed(const Weighed& now, std::size_t index) const;
