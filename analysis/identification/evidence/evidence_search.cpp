@@ -235,11 +235,12 @@ double EvidenceSearch::needed_bits(const Weighed& now) const {
   return std::max(kNamed_bits, kModelError * (data_.data_square() - now.left) / 2 / kNatsPerBit);
 }
 
-bool EvidenceSearch::shows_form(const Weighed& named, std::size_t index, const Weighed& free) const {
+bool EvidenceSearch::shows_form(const Weighed& named, std::size_t index, const Item& curve,
+                                const Weighed& free) const {
   constexpr double kLeft = 0.75, kLeftByForm = 0.5, kOfEvidence = 1.0 / 8;
   const double gained_bits = (free.score - named.score) / kNatsPerBit;
   if (gained_bits < needed_bits(named)) return false;
-  const bool is_form = is_form_of(all_, free.set.back(), named.set[index]);
+  const bool is_form = is_form_of(all_, curve, named.set[index]);
   const bool is_rest_noise = noise_beside(free.left) == 1;
   return free.left < (is_form ? kLeftByForm : kLeft) * named.left ||
          (is_rest_noise && gained_bits > kOfEvidence * bits(named, index));
@@ -252,7 +253,7 @@ bool EvidenceSearch::may_follow(const Weighed& now, const Option& added) const {
   for (std::size_t i = 0; i < now.set.size(); ++i) {
     if (!is_effect(all_, now.set[i])) continue;
     const bool takes_name = is_form_of(all_, added.item, now.set[i]) || bits(joined, i) < needed_bits(joined);
-    if (takes_name && !shows_form(now, i, joined)) return false;
+    if (takes_name && !shows_form(now, i, added.item, joined)) return false;
   }
   return true;
 }
@@ -265,8 +266,8 @@ Set EvidenceSearch::changed(const Weighed& now, std::size_t index) const {
     if (other.item == item || !may_follow(rest, other)) return false;
     const Set exchanged = with(rest.set, other.item);
     if (is_effect(all_, item) && !is_effect(all_, other.item))
-      return shows_form(now, index, weigh(exchanged));
-    if (is_form_of(all_, item, other.item)) return !shows_form(weigh(exchanged), rest.set.size(), now);
+      return shows_form(now, index, other.item, weigh(exchanged));
+    if (is_form_of(all_, item, other.item)) return !shows_form(weigh(exchanged), rest.set.size(), item, now);
     return other.score > now.score + kExchanged_bits * kNatsPerBit;
   };
   const std::vector<Option> others = options(rest.set);

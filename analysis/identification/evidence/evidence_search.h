@@ -50,10 +50,10 @@ class EvidenceSearch {
   /// Returns by how much the entry of the item at `index` raises the evidence of the set, in bits.
   double bits(const Weighed& best, std::size_t index) const;
   Weighed weigh(const Set& set) const;
-  /// Returns whether a set that ends with a curve, in the place of the effect at `index` or beside it, explains clearly
+  /// Returns whether a set with a curve, in the place of the effect at `index` or beside it, explains clearly
   /// more: it leaves a quarter less, or half as much if the curve is over the variable of the effect, for no drag is
   /// exactly linear; or if what it leaves is noise, it gains an eighth of the evidence for the effect.
-  bool shows_form(const Weighed& named, std::size_t index, const Weighed& free) const;
+  bool shows_form(const Weighed& named, std::size_t index, const Item& curve, const Weighed& free) const;
   /// Returns the size of one coefficient with which an item would raise the evidence of `set` by `bits` in 90 % of
   /// flights. With G = X'X of the item beside the set, the evidence rises as in weigh() by a quadratic function of the
   /// estimate, which scatters by 1/sqrt(G_kk) about the size. Signs of coefficients, worth up to a bit, are left out.

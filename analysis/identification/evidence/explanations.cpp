@@ -57,12 +57,10 @@ bool is_refuted(const Hypotheses& all, const EvidenceSearch& search, const Weigh
   for (std::size_t i = 0; i < best.set.size(); ++i) {
     const Entry& entry = all.entries[best.set[i].entry];
     if (entry.kind != Kind::kCurve || !traits.varies_with(entry.variable)) continue;
-    Set without = best.set, with_curve_last = best.set;
-    std::rotate(with_curve_last.begin() + static_cast<std::ptrdiff_t>(i),
-                with_curve_last.begin() + static_cast<std::ptrdiff_t>(i) + 1, with_curve_last.end());
+    Set without = best.set;
     without.erase(without.begin() + static_cast<std::ptrdiff_t>(i));
-    if (search.shows_form(search.weigh(without), index - (i < index ? 1 : 0), search.weigh(with_curve_last)))
-      return true;
+    const std::size_t effect = index - (i < index ? 1 : 0);
+    if (search.shows_form(search.weigh(without), effect, best.set[i], best)) return true;
   }
   return false;
 }
